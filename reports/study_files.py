@@ -29,9 +29,10 @@ def write_study(study: Study, folder: Path) -> Document:
 
 def write_parquet(study: Study, folder: Path) -> None:
     """Write the rows of a study as Parquet."""
-    import pandas as pd
+    import pyarrow as pa
+    import pyarrow.parquet as pq
 
-    pd.DataFrame(study.rows()).to_parquet(folder / f"{study.study}.parquet")
+    pq.write_table(pa.Table.from_pylist(study.rows()), folder / f"{study.study}.parquet")
 
 
 def write_history(history: History, folder: Path) -> Document:

@@ -89,7 +89,8 @@ class Targets:
     def judge(self, answer: Answer) -> Answer:
         """An answer that misses its target as a finding."""
         wanted = {"impact": self.restitution, "friction": self.friction}.get(answer.question)
-        if wanted is None or answer.unit != "1" or abs(answer.measured - wanted) <= NOTEWORTHY:
+        is_judged = answer.question == "friction" or answer.quantity.startswith("rebound / impact speed")
+        if wanted is None or not is_judged or abs(answer.measured - wanted) <= NOTEWORTHY:
             return answer
         return replace(answer, finding="target", detail=f"the target is {wanted:g}")
 

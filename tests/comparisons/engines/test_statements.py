@@ -7,7 +7,6 @@ from dropspin.comparisons.engines.registry import engine
 from dropspin.scenarios import load
 
 TENSOR = np.array([[1.0, 0.3, 0.0], [0.3, 2.0, 0.0], [0.0, 0.0, 2.5]])
-ASKEW = {"shape": "vertices", "points": [[0.2, 0.0, 0.1], [-0.1, 0.3, 0.0], [0.0, -0.2, 0.25], [0.1, 0.1, -0.3]], "mass": 2.7}
 GRAVITY = {"acceleration": [0.0, -9.8, 0.0]}
 BLOCK = {"shape": "box", "half_extents": [0.1, 0.2, 0.3], "mass": 1.0}
 RING = [[0.2 * np.cos(angle), y, 0.2 * np.sin(angle)] for angle in np.pi / 5 * np.arange(10) for y in (-0.1, 0.1)]
@@ -133,7 +132,6 @@ def test_engines_without_a_rest_speed_say_so_in_one_form(name):
 @pytest.mark.parametrize(
     ("name", "body", "tables"),
     [
-        ("mujoco", ASKEW, {"damping": {"angular": 0.1}}),
         ("dart", BLOCK, {"damping": {"angular": 0.1}}),
         ("drake", BLOCK, {"damping": {"angular": 0.1}}),
         ("pybullet", BLOCK, {"damping": {"linear": 31.0}}),

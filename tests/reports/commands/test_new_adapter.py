@@ -16,7 +16,7 @@ def test_written_adapter_passes_the_written_tests(pytester, monkeypatch):
     folder = pytester.path / "deep" / "er"
     assert sorted(path.name for path in folder.iterdir()) == ["test_wobbly_Top2.py", "wobbly_Top2.py"]
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(pytest_plugin.Runs, "_dropspin", lambda runs, *arguments: dropspin(*arguments, cwd=folder))
+    monkeypatch.setattr(pytest_plugin.Runs, "dropspin", lambda runs, *arguments: dropspin(*arguments, cwd=folder))
     tested = pytester.runpytest_inprocess("-q", "-k", "conforms or drop-ball-wobbly", "test_wobbly_Top2.py")
     tested.assert_outcomes(passed=2, deselected=2)
     [row] = [line for line in tested.outlines if line.startswith("wobbly-Top2")]

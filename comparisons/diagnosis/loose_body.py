@@ -73,7 +73,7 @@ class Facts:
         spins: The damping of a spin about each principal axis.
         armature: What the settings add to the mass matrix: a mass [kg], and a moment about each axis [kg m²].
         lifted: The share of the weight that the settings take away.
-        unknown: The setting by which forces act that no exact solution here includes; None if there is none.
+        unknown: The names of the settings by which forces act that no exact solution here includes.
         surface: The name of what it lands on; empty for nothing.
         friction: The coefficient of friction of both together.
         restitution: The coefficient of restitution of both together; None if the engine has none.
@@ -100,7 +100,7 @@ class Facts:
     spins: tuple[Drag, Drag, Drag]
     armature: float
     lifted: float
-    unknown: Setting | None
+    unknown: Sequence[str]
     surface: str
     friction: float
     restitution: float | None

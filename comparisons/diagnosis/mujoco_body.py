@@ -13,9 +13,8 @@ import numpy as np
 from mujoco import rollout
 
 from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, Part, Support, mesh_shape
-from dropspin.comparisons.diagnosis.mujoco_file import BOX, CONES, GEOM, OPTIONS, PLANE, MuJoCoFile, plain, set_options
+from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, OPTIONS, PLANE, RK4, MuJoCoFile, plain, set_options
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
-from dropspin.comparisons.diagnosis.source import Setting, option_setting
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.mujoco_simulation import FULL_STATE, quiet
 from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
@@ -24,7 +23,14 @@ from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, 
 from dropspin.scenarios.truths.settings import joint_damping
 from dropspin.scenarios.truths.soft_rest import GeomSettings, SoftContact
 
-UNMODELLED = {"neq": "equality constraints", "ntendon": "tendons", "nu": "actuators", "nflex": "flexible bodies"}
+UNMODELLED = {
+    "neq": "equality constraints",
+    "ntendon": "tendons",
+    "nu": "actuators",
+    "nflex": "flexible bodies",
+    "flg_surfacevel": "surface velocities",
+    "flg_adhesion": "adhesion of geometries",
+}
 UPWARD = np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0])
 """The rotation [w, x, y, z] that takes z to y."""
 FLAT = 1e-9
@@ -71,11 +77,14 @@ class MuJoCoBody(LooseBody):
         self.remedies = {
             "damping": ({"damping": 0.0}, "<freejoint/>"),
             "armature": ({"armature": 0.0}, 'armature="0"'),
-            "integrator": ({"integrator": "RK4"}, '<option integrator="RK4"/>'),
-            "cone": ({"cone": "elliptic"}, '<option cone="elliptic"/>'),
-            "impratio": ({"cone": "elliptic", "impratio": 10.0}, '<option cone="elliptic" impratio="10"/>'),
+            "integrator": ({"integrator": RK4}, '<option integrator="RK4"/>'),
+            "cone": ({"cone": ELLIPTIC}, '<option cone="elliptic"/>'),
+            "impratio": ({"cone": ELLIPTIC, "impratio": 10.0}, '<option cone="elliptic" impratio="10"/>'),
             "margin": ({"margin": 0.0}, 'margin="0"'),
+            "frictionloss": ({"frictionloss": 0.0}, 'frictionloss="0"'),
+            "density": ({"density": 0.0, "viscosity": 0.0}, '<option density="0" viscosity="0"/>'),
         }
+        self.remedies["viscosity"] = self.remedies["density"]
 
     def changed(self, changes: Changes) -> LooseBody:
         return MuJoCoBody(*self._given, changes)
@@ -120,6 +129,7 @@ class MuJoCoBody(LooseBody):
             spec = mujoco.MjSpec()
             set_options(spec.option, self._file.model.opt, dt, self._changes)
             spec.option.gravity = gravity
+            spec.option.wind = rotate(self._level, self._file.model.opt.wind)
             spec.compiler.degree = False
             self._add_bodies(spec)
             if floor:
@@ -139,7 +149,7 @@ class MuJoCoBody(LooseBody):
             if is_head:
                 joint = new.add_freejoint()
                 joint.damping, joint.armature = self._damping, self._armature
-                if self._dof is not None:
+                if self._dof is not None and "frictionloss" not in self._changes:
                     joint.frictionloss = old.dof_frictionloss[self._dof]
             if old.body_mass[body] > 0.0:
                 moments = np.array(old.body_inertia[body])
@@ -169,6 +179,7 @@ class MuJoCoBody(LooseBody):
         """What a geometry is and where, as the compiled model has it."""
         old = self._file.model
         found = {"type": old.geom_type[geom], "size": old.geom_size[geom], "pos": old.geom_pos[geom], "quat": old.geom_quat[geom]}
+        found |= {"fluid_ellipsoid": int(old.geom_fluid[geom, 0]), "fluid_coefs": old.geom_fluid[geom, 1:6]}
         if old.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
             return found
         points, faces = mesh_of(old, geom)
@@ -291,13 +302,11 @@ class MuJoCoBody(LooseBody):
     def _names(self) -> list[str]:
         return list(self._file.names(GEOM, self._file.model.ngeom))
 
-    def _unknown_forces(self) -> Setting | None:
-        """The setting of a fluid or of dry friction in the joint, if there is one."""
-        old, settings = self._file.model, self._text.settings
-        if self._dof is not None and old.dof_frictionloss[self._dof] > 0.0:
-            return settings.get("frictionloss", Setting("frictionloss"))
-        fluid = [name for name in ("density", "viscosity") if getattr(old.opt, name) > 0.0]
-        return option_setting(self._file.source, "option", fluid[0], "0") if fluid else None
+    def _unknown_forces(self) -> tuple[str, ...]:
+        """The settings of a fluid and of dry friction in the joint."""
+        alone = self._alone
+        found = ["frictionloss"] * bool(alone.dof_frictionloss.any())
+        return (*found, *(name for name in ("density", "viscosity") if getattr(alone.opt, name) > 0.0))
 
     def _rest_depth(self, touching: Mapping[str, Any] | None, pose: Array) -> float:
         """The depth of a body that rests on one point, or on several that share its weight, below the surface [m]; NaN of others."""
@@ -309,7 +318,7 @@ class MuJoCoBody(LooseBody):
         names = ("solref", "solimp", "condim", "margin")
         settings = GeomSettings(friction=friction, **{name: plain(np.asarray(touching[name])) for name in names})
         is_safe = not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE
-        contact = SoftContact(settings, option.cone == CONES["elliptic"], option.impratio, option.timestep if is_safe else 0.0)
+        contact = SoftContact(settings, option.cone == ELLIPTIC, option.impratio, option.timestep if is_safe else 0.0)
         mass = float(self._alone.body_mass.sum())
         return contact.depth(float(np.linalg.norm(self._file.gravity)) * mass / (mass + self._armature) / points) - settings.margin
 

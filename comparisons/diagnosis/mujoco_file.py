@@ -20,8 +20,7 @@ BODY, GEOM = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_GEOM
 PLANE, BOX = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX
 SURFACES = (PLANE, BOX)
 """The kinds of geometries that a body may land on."""
-INTEGRATORS = {"Euler": 0, "RK4": 1, "implicit": 2, "implicitfast": 3}
-CONES = {"pyramidal": 0, "elliptic": 1}
+RK4, ELLIPTIC = int(mujoco.mjtIntegrator.mjINT_RK4), int(mujoco.mjtCone.mjCONE_ELLIPTIC)
 OPTIONS = [name for name in dir(mujoco.MjSpec().option) if not name.startswith("_")]
 ADDED = "a plane with default settings"
 """The surface of a file that has none."""
@@ -173,12 +172,9 @@ def plain(value: Any) -> Any:
 def set_options(option: Any, compiled: Any, dt: float, changes: Changes) -> None:
     """Give a specification the options of a compiled model, but for the time step [s] and changes; without the automatic reset."""
     for name in OPTIONS:
-        setattr(option, name, getattr(compiled, name))
+        setattr(option, name, changes.get(name, getattr(compiled, name)))
     option.timestep = dt
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    option.integrator = INTEGRATORS[str(changes["integrator"])] if "integrator" in changes else compiled.integrator
-    option.cone = CONES[str(changes["cone"])] if "cone" in changes else compiled.cone
-    option.impratio = changes.get("impratio", compiled.impratio)
 
 
 def one_line(error: Exception) -> str:

@@ -12,6 +12,8 @@ from dropspin.scenarios.state import Array
 
 SAME = 1e-6
 """Relative difference up to which a moment of inertia is the one that was written."""
+IN_FORCE = {"lateral_friction": 1.0, "rolling_friction": 0.0, "spinning_friction": 0.0, "restitution": 0.0}
+"""The settings of a contact in a URDF file, which MuJoCo does not read, and what it has instead."""
 CHANGED_BY = ("balanceinertia", "boundinertia", "boundmass", "settotalmass", "inertiafromgeom")
 """Settings of the compiler that change the inertia of a file."""
 
@@ -60,7 +62,7 @@ class BodyText:
     def settings(self) -> dict[str, Setting]:
         """The settings that matter, in the words of the file."""
         root, body = self._file.source, self.element
-        options = {"timestep": "0.002", "integrator": "Euler", "cone": "pyramidal", "impratio": "1"}
+        options = {"timestep": "0.002", "integrator": "Euler", "cone": "pyramidal", "impratio": "1", "density": "0", "viscosity": "0"}
         found = {name: option_setting(root, "option", name, default) for name, default in options.items()}
         if body is None:
             return found
@@ -103,9 +105,10 @@ class BodyText:
             element = self.element
             if self._file.model.body_weldid[self._head] == 0:
                 yield "base", Setting("the root link") if element is None else element.words, "welded to the world"
-            for tag in ("restitution", "rolling_friction", "spinning_friction"):
+            for tag, value in IN_FORCE.items():
                 for found in [] if element is None else element.every(tag):
-                    yield tag, found.words, "not read"
+                    if found.number("value", value) != value:
+                        yield tag, found.words, "not read"
 
 
 def digits(values: Sequence[float]) -> str:

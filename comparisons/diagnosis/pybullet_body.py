@@ -173,7 +173,7 @@ class PyBulletBody(LooseBody):
             spins=(Drag(), Drag(), Drag()),
             armature=0.0,
             lifted=0.0,
-            unknown=None,
+            unknown=(),
             surface=SURFACE if parts else "",
             friction=touching.dynamics[1] * plane[1],
             restitution=touching.restitution * plane[5],

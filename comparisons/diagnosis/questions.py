@@ -442,10 +442,10 @@ def judged(
     finding: Finding = ""
     settings: tuple[str, ...] = ()
     limit = math.nan
-    if facts.unknown is not None:
+    if facts.unknown:
         exact = [math.nan] * len(values)
         if abs(values[0] - free) > NOTEWORTHY * (100.0 if unit == "%" else abs(free)):
-            finding, settings = "setting", ("unknown",)
+            finding, settings = "setting", (*facts.unknown, *(FRICTIONAL if question == "slide" else ()))
         return Answer(question, quantity, unit, values[0], physical=free, finding=finding, settings=settings)
     if all(map(math.isfinite, values)) and is_sufficient(dts):
         limit = error_budget(dts, errors, negligible=0.1 * NOTEWORTHY * scale).asymptotic_error if any(errors) else 0.0

@@ -33,7 +33,6 @@ COLUMNS = (
     "dt = …: measured at this time step. Exact: the exact solution with the damping, armature and margin in force. "
     "Ideal: the exact solution without these. In parentheses: the range over eight phases of the impact within a time step."
 )
-SETTINGS = {"unknown": "a fluid or dry friction"}
 
 
 class Diagnosed(Study):
@@ -76,15 +75,19 @@ def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
         return [Paragraph(f"{body.name}: {body.breakdown}.", style="bold", on_terminal=on_terminal)]
     lands = f"; lands on {body.surface}, friction {body.friction:g}" if body.surface else "; lands on nothing"
     head = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg; {body.engine}, time step {in_ms(body.dt)}{lands}."
-    left = [f"Not modelled: {', '.join(body.unmodelled)} of the file."] if body.unmodelled else []
     drawn = charts(body)
     return [
         Heading(f"{body.name} in {body.engine.split()[0]}"),
         Paragraph(head, on_terminal=on_terminal),
         Table(answer_rows(body), on_terminal=on_terminal),
-        Sentences([*sentences(body), *left], numbered=True, on_terminal=on_terminal),
+        Sentences([*sentences(body), *_left_out(body)], numbered=True, on_terminal=on_terminal),
         *([Charts(f"{body.name} {body.engine.split()[0]}", drawn)] if drawn else []),
     ]
+
+
+def _left_out(body: BodyDiagnosis) -> list[str]:
+    """What the simulations leave out."""
+    return [f"Not modelled: {', '.join(body.unmodelled)} of the file."] if body.unmodelled else []
 
 
 def of_several(bodies: Sequence[BodyDiagnosis]) -> list[str]:
@@ -93,7 +96,7 @@ def of_several(bodies: Sequence[BodyDiagnosis]) -> list[str]:
     engines, names = {body.engine for body in bodies}, {body.name for body in bodies}
     for body in bodies:
         owner = " ".join([body.name] * (len(names) > 1) + [body.engine.split()[0]] * (len(engines) > 1))
-        for sentence in [f"{body.breakdown}."] if body.breakdown else sentences(body):
+        for sentence in [f"{body.breakdown}."] if body.breakdown else [*sentences(body), *_left_out(body)]:
             owners.setdefault(sentence, []).append(owner)
     return [f"{_listed(of_sentence)}: {sentence}" for sentence, of_sentence in owners.items()]
 
@@ -216,7 +219,7 @@ def _told(answer: Answer) -> str:
 
 def _settings(body: BodyDiagnosis, answer: Answer) -> list[str]:
     known = body.settings or {}
-    return [str(known.get(name, SETTINGS.get(name))) for name in answer.settings if name in known or name in SETTINGS]
+    return [str(known[name]) for name in answer.settings if name in known]
 
 
 def differences(bodies: Sequence[BodyDiagnosis]) -> list[dict[str, str]]:

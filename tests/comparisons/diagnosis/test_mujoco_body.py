@@ -10,6 +10,7 @@ from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
 from dropspin.comparisons.diagnosis.questions import QUESTIONS, fall, impact, rest, slide, spin, tumble
 from dropspin.comparisons.diagnosis.study import _answers
 from dropspin.scenarios import DropspinError
+from dropspin.scenarios.state import POSITION, UP
 
 FREE = '<body name="b" pos="0 0 1"><freejoint/>{}</body>'
 PLANE = '<geom name="floor" type="plane" size="1 1 .1"/>'
@@ -228,3 +229,38 @@ def test_wrong_file_ends_in_one_line(tmp_path, text, message):
     with pytest.raises(DropspinError, match=message) as error:
         MuJoCoModel(tmp_path / "bad.xml", "bad.xml").bodies([], False)
     assert "\n" not in str(error.value)
+
+
+def test_fluid_and_wind_act_as_in_mujoco_and_are_named(tmp_path):
+    import mujoco
+
+    geom = '<geom type="ellipsoid" size=".05 .04 .01" mass=".02" fluidshape="ellipsoid" fluidcoef=".5 .25 1.5 1 1"/>'
+    body = body_of(tmp_path, FREE.format(geom), 'density="1.2" wind="3 0 1"')
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "model.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 200)
+    along = body.motions(body.facts.start()[np.newaxis], 0.002, 200, -9.81 * UP, floor=False)[0]
+    x, _, z = data.qpos[:3] - [0.0, 0.0, 1.0]
+    assert abs(x) > 0.1
+    assert along[-1, POSITION] - along[0, POSITION] == pytest.approx([x, z, 0.0], abs=1e-9)
+    found = {answer.question: answer for answer in findings_of(body)}
+    assert str(body.facts.settings[found["fall"].settings[0]]) == 'density="1.2" (model.xml, line 1)'
+    [remedy] = found["fall"].remedies
+    assert remedy.text == '<option density="0" viscosity="0"/>'
+    assert remedy.value == pytest.approx(4.905, rel=3e-3)
+
+
+def test_pyramid_is_told_from_dry_friction_of_the_joint(tmp_path):
+    world = '<body name="b" pos="0 0 1"><joint type="free" frictionloss=".01"/><geom type="box" size=".05 .05 .02" mass="1"/></body>'
+    found = {answer.quantity: answer for answer in findings_of(body_of(tmp_path, world))}
+    assert found["stopping distance from 0.5 m/s at 45°"].remedies[0].text.startswith('<option cone="elliptic"')
+    assert {answer.settings for answer in found.values() if answer.question == "spin"} == {("frictionloss",)}
+
+
+def test_friction_of_a_urdf_is_not_read(tmp_path):
+    contact = '<contact><lateral_friction value="0.3"/><rolling_friction value="0"/></contact>'
+    shape = '<collision><geometry><box size=".1 .1 .1"/></geometry></collision>'
+    mass = '<inertial><mass value="1"/><inertia ixx=".002" iyy=".002" izz=".002" ixy="0" ixz="0" iyz="0"/></inertial>'
+    body = body_of(tmp_path, f'<robot name="r"><link name="l">{contact}{mass}{shape}</link></robot>', file="model.urdf")
+    assert body.facts.friction == 1.0
+    assert [name for name, _, made in body.facts.ignored if made == "not read"] == ["lateral_friction"]

@@ -38,7 +38,7 @@ def _impossible(facts: Facts, given: Array) -> Iterator[Answer]:
         squares = (0.5 * np.trace(given) * np.eye(3) - given) / facts.mass
         excess = 1.0 / largest_multiple(facts.points, squares, 1.0 / ROUNDING)
         if excess > ROUNDING:
-            excess = max(1.0, largest / largest_possible(facts, given))
+            excess = factor if (factor := largest / largest_possible(facts, given)) > ROUNDING else excess
             yield Answer("inertia", "largest moment / largest possible", measured=excess, detail="this mass and shape", **common)
 
 

@@ -17,12 +17,15 @@ from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, OPTI
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.mujoco_simulation import FULL_STATE, quiet
+from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from dropspin.scenarios.rotations import about, cross, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.settings import joint_damping
 from dropspin.scenarios.truths.soft_rest import GeomSettings, SoftContact
 
+MODELLED = [getattr(mujoco.mjtGeom, f"mjGEOM_{kind}") for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")]
+"""The kinds of geometries of bodies."""
 UNMODELLED = {
     "neq": "equality constraints",
     "ntendon": "tendons",
@@ -60,6 +63,10 @@ class MuJoCoBody(LooseBody):
         self._file, old, self._head = file, file.model, file.heads[name]
         self._group = file.group(self._head)
         self._geoms = [geom for geom in range(old.ngeom) if old.geom_bodyid[geom] in self._group]
+        for geom in self._geoms:
+            if int(old.geom_type[geom]) not in map(int, MODELLED):
+                kind = mujoco.mjtGeom(int(old.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
+                raise Breakdown("declined", f"its geometry {self._names[geom]!r} is of the type {kind}, which is not modelled")
         self._surface = file.surface(on, self._geoms)
         self._text = BodyText(file, self._head, self._surface)
         self._pairs: dict[int, dict[str, Any]] = {}

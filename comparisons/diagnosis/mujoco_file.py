@@ -22,6 +22,7 @@ SURFACES = (PLANE, BOX)
 """The kinds of geometries that a body may land on."""
 RK4, ELLIPTIC = int(mujoco.mjtIntegrator.mjINT_RK4), int(mujoco.mjtCone.mjCONE_ELLIPTIC)
 OPTIONS = [name for name in dir(mujoco.MjSpec().option) if not name.startswith("_")]
+MOST_NAMES = 20
 ADDED = "a plane with default settings"
 """The surface of a file that has none."""
 
@@ -94,7 +95,7 @@ class MuJoCoFile:
         if not found:
             if not heavy:
                 raise DropspinError(f"{self.given}: no body moves and has mass; give a body a free joint and a mass.")
-            there = f"{', '.join(heavy)} move on joints"
+            there = f"{', '.join(heavy[:MOST_NAMES])}{' and others' * (len(heavy) > MOST_NAMES)} move on joints"
             raise DropspinError(f"{self.given}: no body is free: {there}; name one with --body, or give --loose for all.")
         return list(found)
 

@@ -229,7 +229,8 @@ def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         noise = [max(float(np.ptp(ratio)) / math.sqrt(12.0) / len(ratio), LEAST_NOISE) for ratio in ratios]
         limit = 0.0 if max(means) == 0.0 else math.nan
         if is_sufficient(dts) and max(means) > 0.0:
-            limit = error_budget(dts, means, resolution=noise, signed=False, negligible=0.1 * NOTEWORTHY).asymptotic_error
+            budget = error_budget(dts, means, resolution=noise, signed=False, negligible=0.1 * NOTEWORTHY)
+            limit = math.nan if budget.cause == "unresolved" else budget.asymptotic_error
         quantity = f"{name}rebound / impact speed at {speed:g} m/s"
         exact = math.nan if one.facts.restitution is None else one.facts.restitution
         change = abs(means[0] - (means[-1] if math.isnan(exact) else exact))

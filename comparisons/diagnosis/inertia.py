@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from dropspin.comparisons.diagnosis.answers import Answer, Remedy
 from dropspin.comparisons.diagnosis.loose_body import Facts
-from dropspin.comparisons.diagnosis.questions import Answer, Remedy
 from dropspin.scenarios.bodies.possible_moments import largest_multiple
 from dropspin.scenarios.state import Array
 

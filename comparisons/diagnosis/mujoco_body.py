@@ -12,20 +12,18 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, Part, Support, mesh_shape
+from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, Part, Support
 from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, OPTIONS, PLANE, RK4, MuJoCoFile, plain, set_options
+from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, mesh_of, quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.mujoco_simulation import FULL_STATE, quiet
 from dropspin.comparisons.running.recording import Breakdown
-from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from dropspin.scenarios.rotations import about, cross, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.settings import joint_damping
 from dropspin.scenarios.truths.soft_rest import GeomSettings, SoftContact
 
-MODELLED = [getattr(mujoco.mjtGeom, f"mjGEOM_{kind}") for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")]
-"""The kinds of geometries of bodies."""
 UNMODELLED = {
     "neq": "equality constraints",
     "ntendon": "tendons",
@@ -34,8 +32,6 @@ UNMODELLED = {
     "flg_surfacevel": "surface velocities",
     "flg_adhesion": "adhesion of geometries",
 }
-UPWARD = np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0])
-"""The rotation [w, x, y, z] that takes z to y."""
 FLAT = 1e-9
 """Depth, relative to the size, at which contacts are counted."""
 
@@ -283,27 +279,11 @@ class MuJoCoBody(LooseBody):
     def _part(self, number: int) -> Part:
         """A geometry as a shape, relative to the centre of mass."""
         model, data = self._alone, self._at_rest
-        size, kind = model.geom_size[number], model.geom_type[number]
-        position, turn = data.geom_xpos[number] - self._offset, quaternion(data.geom_xmat[number])
-        solid: dict[str, Any] = {"mass": 1.0, "inertia": "solid"}
-        shape: Shape
-        if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-            shape = Sphere(shape="sphere", radius=float(size[0]), **solid)
-        elif kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-            shape = Capsule(shape="capsule", radius=float(size[0]), half_length=float(size[1]), **solid)
-        elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-            shape = Cylinder(shape="cylinder", radius=float(size[0]), half_length=float(size[1]), **solid)
-        elif kind == BOX:
-            shape = Box(shape="box", half_extents=tuple(size.tolist()), **solid)
-        elif kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-            shape = Ellipsoid(shape="ellipsoid", half_extents=tuple(size.tolist()), **solid)
-        else:
-            shape = mesh_shape(*mesh_of(model, number))
-            position = position + rotate(turn, shape.centre)
-        if isinstance(shape, Capsule | Cylinder):  # along y here, along z there
-            turn = multiply(turn, np.roll(UPWARD, -1))
+        shape, shift, turned = shape_of(model, number)
+        turn = quaternion(data.geom_xmat[number])
+        position = data.geom_xpos[number] - self._offset + rotate(turn, shift)
         geom = int(model.geom(number).name.split()[1])
-        return Part(self._names[geom], shape, position, turn, not self._pairs or geom in self._pairs)
+        return Part(self._names[geom], shape, position, multiply(turn, turned), not self._pairs or geom in self._pairs)
 
     @cached_property
     def _names(self) -> list[str]:
@@ -343,18 +323,3 @@ class MuJoCoBody(LooseBody):
         places = data.contact.pos[:, [0, 2]]
         is_even = len(places) > 0 and bool(np.abs(places.mean(axis=0)).max() < 1e-6 * size)
         return len(places) if is_even and np.ptp(np.linalg.norm(places, axis=1)) < 1e-6 * size else 0
-
-
-def mesh_of(model: Any, geom: int) -> tuple[Array, Any]:
-    """The vertices and the triangles of a mesh in the frame of its geometry."""
-    mesh = model.geom_dataid[geom]
-    first, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
-    points = model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float)
-    return points, model.mesh_face[face : face + model.mesh_facenum[mesh]].astype(np.int64)
-
-
-def quaternion(matrix: Array) -> Array:
-    """The rotation of a matrix, shape (9,)."""
-    found = np.empty(4)
-    mujoco.mju_mat2Quat(found, matrix)
-    return np.roll(found, -1)

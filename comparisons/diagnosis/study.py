@@ -8,9 +8,12 @@ from itertools import product
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, Answer, Finding, Remedy
+from dropspin.comparisons.diagnosis.flight import fall, spin, tumble
+from dropspin.comparisons.diagnosis.friction import roll, slide
 from dropspin.comparisons.diagnosis.inertia import inertia
+from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
-from dropspin.comparisons.diagnosis.questions import NOTEWORTHY, QUESTIONS, Answer, Finding, Remedy
 from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.running.entries import present_entry
@@ -31,6 +34,8 @@ SAFE = 0.85
 """Factor on the time step at which an error of first order would be as large as a finding."""
 Found = TypeVar("Found")
 Question = Callable[[LooseBody, Sequence[float]], list[Answer]]
+"""A function of a body and of time steps, of which the first is judged."""
+QUESTIONS: tuple[Question, ...] = (fall, spin, tumble, impact, rest, slide, roll)
 
 
 class ModelFile(Protocol):

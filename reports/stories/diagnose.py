@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.questions import Answer
+from dropspin.comparisons.diagnosis.answers import Answer
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis, Diagnosis
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line

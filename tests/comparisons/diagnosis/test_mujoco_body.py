@@ -5,10 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from dropspin.comparisons.diagnosis.flight import fall, spin, tumble
+from dropspin.comparisons.diagnosis.friction import slide
 from dropspin.comparisons.diagnosis.inertia import inertia
+from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
-from dropspin.comparisons.diagnosis.questions import QUESTIONS, fall, impact, rest, slide, spin, tumble
-from dropspin.comparisons.diagnosis.study import _answers
+from dropspin.comparisons.diagnosis.study import QUESTIONS, _answers
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.state import POSITION, UP
 

@@ -7,11 +7,13 @@ import pytest
 
 pytest.importorskip("pybullet", exc_type=ImportError)
 
-from dropspin.comparisons.diagnosis import questions
+from dropspin.comparisons.diagnosis import landing
+from dropspin.comparisons.diagnosis.flight import fall, spin, tumble
+from dropspin.comparisons.diagnosis.friction import roll, slide
 from dropspin.comparisons.diagnosis.inertia import inertia
+from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.pybullet_body import PyBulletModel
 from dropspin.comparisons.diagnosis.pybullet_server import server
-from dropspin.comparisons.diagnosis.questions import fall, impact, rest, roll, slide, spin, tumble
 from dropspin.comparisons.diagnosis.study import _answers
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import UnknownName
@@ -144,7 +146,7 @@ def test_restitution_is_the_product_with_that_of_the_plane(tmp_path):
 
 
 def test_remedies_are_tried(tmp_path, monkeypatch):
-    monkeypatch.setattr(questions, "IMPACTS", (3.0,))
+    monkeypatch.setattr(landing, "IMPACTS", (3.0,))
     ball = body(tmp_path, link(BALL, extra='<contact><restitution value="0.5"/></contact>'))
     of_fall = next(iter(_answers(ball, fall)))
     assert of_fall.remedies[0].text == "changeDynamics(body, -1, linearDamping=0, angularDamping=0)"

@@ -1,0 +1,141 @@
+"""How a body falls, spins and tumbles, far from any surface."""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, Answer, judged, vector_text
+from dropspin.comparisons.diagnosis.loose_body import DIRECTIONS, LooseBody
+from dropspin.comparisons.engines.base import Diverged
+from dropspin.scenarios.rotations import unrotate
+from dropspin.scenarios.state import ORIENTATION, SPIN, UP, Array
+from dropspin.scenarios.truths.settings import terminal_speed, time_constant
+
+FALL, TURN = 1.0, 1.0  # s
+SPEED = 10.0  # rad/s
+OBLIQUE = np.array([0.6, 0.48, 0.64])
+"""The stated direction of a spin, in the body frame."""
+DIAGONALS = np.array([[0, 1, 1], [1, 0, 1], [1, 1, 0], [0, 1, -1], [1, 0, -1], [1, -1, 0]]) / math.sqrt(2.0)
+FASTEST, SLOWEST = 1e3, 1e-2  # rad/s
+LONGEST = 1_000_000
+"""Steps of one question at most."""
+
+
+def fall(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
+    """The distance fallen in a second, and the terminal speed."""
+    facts = body.facts
+    if not facts.gravity > 0.0:
+        return []
+    start, fallen, exact = facts.start(), [], []
+    for dt in dts:
+        steps = round(FALL / dt)
+        end = body.motions(start[np.newaxis], dt, steps, -facts.gravity * UP, floor=False)[0, -1]
+        fallen.append(start[1] - end[1])
+        exact.append(facts.fallen(steps * dt))
+    free = 0.5 * facts.gravity * (round(FALL / dts[0]) * dts[0]) ** 2
+    answers = [judged(body, "fall", "distance in 1 s", "m", dts, fallen, exact, free)]
+    if any(facts.falls):
+        speed = terminal_speed(facts.gravity * (1.0 - facts.lifted), facts.mass, *facts.falls)
+        answers.append(Answer("fall", "terminal speed", "m/s", in_force=speed, physical=math.inf))
+    return answers
+
+
+def spin(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
+    """The decay of a spin about each principal axis."""
+    facts, answers = body.facts, []
+    moments, axes = facts.principal
+    for number, axis in enumerate(axes.T):
+        name = f"about {'xyz'[number]}" if np.count_nonzero(axis) == 1 else f"about {vector_text(axis)}"
+        start = facts.start(spin=SPEED * axis)
+        tau = time_constant(SPEED, moments[number], facts.armature, *facts.spins[number])
+        if tau < TURN:
+            times = [_decay(body, start, dt, tau) for dt in dts]
+            answers.append(judged(body, "spin", f"1/e time {name}", "s", dts, times, [tau] * len(dts), math.inf))
+        else:
+            ends = [_turned(body, start, dt) for dt in dts]
+            kept = [float(np.linalg.norm(end[SPIN])) / SPEED for end in ends]
+            exact = [facts.spun(number, SPEED, TURN) / SPEED] * len(dts)
+            answers.append(judged(body, "spin", f"fraction kept in 1 s {name}", "1", dts, kept, exact, 1.0))
+    return answers
+
+
+def _decay(body: LooseBody, start: Array, dt: float, tau: float) -> float:
+    """The time at which a spin is 1/e of its start [s], interpolated between steps as an exponential."""
+    steps = min(math.ceil(3.0 * tau / dt) + 3, LONGEST)
+    speeds = np.linalg.norm(body.motions(start[np.newaxis], dt, steps, np.zeros(3), floor=False)[0, :, SPIN], axis=1)
+    below = np.flatnonzero(speeds <= SPEED / math.e)
+    if not len(below):
+        return math.inf
+    last = int(below[0])
+    if speeds[last] <= 0.0:
+        return dt * last
+    before, after = math.log(speeds[last - 1]), math.log(speeds[last])
+    return dt * (last - 1 + (before - math.log(SPEED) + 1.0) / (before - after))
+
+
+def _turned(body: LooseBody, starts: Array, dt: float) -> Array:
+    """The states after a second without gravity and contacts, of one start, shape (13,), or of several, shape (n, 13)."""
+    motions = body.motions(np.atleast_2d(starts), dt, round(TURN / dt), np.zeros(3), floor=False)
+    found: Array = motions[:, -1]
+    return found[0] if starts.ndim == 1 else found
+
+
+def tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
+    """The change of energy of a spin about no principal axis, which turns freely: as stated, worst, and where it reaches 1 %."""
+    facts = body.facts
+    moments, axes = facts.principal
+    is_slowed = any(time_constant(SPEED, m, facts.armature, *drag) < TURN for m, drag in zip(moments, facts.spins, strict=True))
+    if np.ptp(moments) < 1e-9 * moments.max() or is_slowed:
+        return []
+    start, free = facts.start(spin=SPEED * OBLIQUE), 0.0
+    ends = [_turned(body, start, dt) for dt in dts]
+    gains = [float(_energy_gain(body, start, end)) for end in ends]
+    steps = round(TURN / dts[0])
+    after = facts.in_force(start, np.array([0.0, steps * dts[0]]), 0.0)[-1]
+    exact = float(_energy_gain(body, start, after))
+    of_stated = judged(body, "tumble", f"energy change in 1 s, {SPEED:g} rad/s", "%", dts, gains, [exact] * len(dts), free)
+    if of_stated.finding == "setting":  # of damping, which no direction and no step is without
+        return [of_stated]
+    tried = np.concatenate([DIRECTIONS[DIRECTIONS[:, 1] >= 0.0], DIAGONALS, [OBLIQUE]])
+    starts = np.array([facts.start(spin=SPEED * (axes @ direction)) for direction in tried])
+    by_direction = _energy_gain(body, starts, _turned(body, starts, dts[0]))
+    worst = int(np.argmax(np.abs(by_direction)))
+    turned = 2.0 * math.degrees(math.acos(min(1.0, abs(float(ends[0][ORIENTATION] @ after[ORIENTATION])))))
+    answers = [of_stated, Answer("tumble", "attitude error", "°", turned, in_force=0.0)]
+    answers += [Answer("tumble", f"worst axis {vector_text(tried[worst])}", "%", float(by_direction[worst]))]
+    if abs(by_direction[worst] - exact) > 100.0 * NOTEWORTHY or of_stated.finding:
+        speed = _threshold(lambda w: _gain(body, facts.start(spin=w * (axes @ tried[worst])), dts[0]), SLOWEST, FASTEST)
+        answers.append(Answer("tumble", "spin for 1 %", "rad/s", speed))
+    if of_stated.finding == "time step":
+        step = _threshold(lambda dt: _gain(body, start, dt), 1e-2 * dts[0], dts[0])
+        answers.append(Answer("tumble", "dt for 1 %", "s", step))
+    return answers
+
+
+def _gain(body: LooseBody, start: Array, dt: float) -> float:
+    """The change of energy in a second [%]; inf if the simulation breaks down."""
+    try:
+        return float(_energy_gain(body, start, _turned(body, start, dt)))
+    except Diverged:
+        return math.inf
+
+
+def _energy_gain(body: LooseBody, first: Array, last: Array) -> Array:
+    """The change of the kinetic energy of rotation from first to last states [%], shape (...)."""
+
+    def energy(states: Array) -> Array:
+        spins = unrotate(states[..., ORIENTATION], states[..., SPIN])
+        return np.einsum("...i,ij,...j->...", spins, body.facts.inertia, spins)
+
+    return 100.0 * (energy(last) / energy(first) - 1.0)
+
+
+def _threshold(gain: Callable[[float], float], low: float, high: float) -> float:
+    """The value from which a gain that grows with it exceeds 1 %, by bisection; inf if it does nowhere, low if it does from there."""
+    if abs(gain(high)) < 100.0 * NOTEWORTHY:
+        return math.inf
+    while high > 1.02 * low:
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if abs(gain(middle)) >= 100.0 * NOTEWORTHY else (middle, high)
+    return low

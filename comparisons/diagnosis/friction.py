@@ -1,0 +1,116 @@
+"""How a body slides, creeps and rolls on a surface."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from dropspin.comparisons.diagnosis.answers import FRICTIONAL, UNTURNED, WATCHED, Answer, judged
+from dropspin.comparisons.diagnosis.landing import settled, tilt
+from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
+from dropspin.scenarios.rotations import rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
+from dropspin.scenarios.truths.settings import spin_about_axis
+
+SLIDE = 0.5  # m/s, and more where friction would stop it within a quarter of a second
+LONGEST_SLIDE = 5.0  # m
+LONG_SLIDE = 0.25  # s, within which a body stops
+ONE_WAY = 0.05
+"""Relative difference of two distances from which friction depends on direction."""
+
+
+def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
+    """The distance in which a body that slides without tipping stops, along and at 45 degrees; and its creep on a slope that holds."""
+    facts = body.facts
+    if not facts.surface or not facts.gravity > 0.0 or not facts.friction > 0.0:
+        return []
+    free, exact = SLIDE**2 / (2.0 * facts.friction * facts.gravity), _stop(facts)
+    if free > LONGEST_SLIDE:
+        return []
+    end = settled(body, dts[0])[-1:]
+    rests = [body.motions(end, dt, math.ceil(WATCHED / dt), -facts.gravity * UP, floor=True)[0, -1] for dt in dts]
+    half = math.sqrt(0.5)
+    found = [_stops(body, dts, rests, direction) for direction in (np.array([1.0, 0.0, 0.0]), np.array([half, 0.0, half]))]
+    if not all(found):
+        return []
+    along, across = found
+    answers = [
+        judged(body, "slide", f"stopping distance from {SLIDE:g} m/s{name}", "m", dts, stops, [exact] * len(dts), free)
+        for name, stops in (("", along), (" at 45°", across))
+    ]
+    # Soft contacts take some time to carry a load that shifts: a shorter slide says more of that than of friction.
+    is_short = SLIDE / (facts.friction * facts.gravity) < LONG_SLIDE
+    answers = [replace(one, finding="", settings=()) if one.finding in ("time step", "model") and is_short else one for one in answers]
+    turns = min(abs(second / first - 1.0) for first, second in zip(along, across, strict=True)) > ONE_WAY
+    if turns and not answers[1].finding:
+        answers[1] = replace(answers[1], finding="model")
+    answers = [replace(one, settings=FRICTIONAL) if one.finding in ("time step", "model") else one for one in answers]
+    return answers + _creep(body, dts[0])
+
+
+def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direction: Array) -> list[float]:
+    """The distances in which a body that slides in a direction stops [m]; empty if it tips over."""
+    facts, found = body.facts, []
+    for dt, rest in zip(dts, rests, strict=True):
+        start = rest.copy()
+        start[VELOCITY], start[SPIN] = SLIDE * direction, 0.0
+        steps = math.ceil((1.5 * SLIDE / (facts.friction * facts.gravity) + 0.1) / dt)
+        states = body.motions(start[np.newaxis], dt, steps, -facts.gravity * UP, floor=True)[0]
+        if tilt(states) > UNTURNED:
+            return []
+        foot = unrotate(start[ORIENTATION], -start[1] * UP)  # a point of the body below its centre, which sways less
+        moved = states[-1, POSITION] - start[POSITION] + rotate(states[-1, ORIENTATION], foot) - rotate(start[ORIENTATION], foot)
+        found.append(float(moved @ direction))
+    return found
+
+
+def _stop(facts: Facts) -> float:
+    """The exact distance in which friction and damping stop a body [m]: the integral of v over its deceleration."""
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    v = 0.5 * SLIDE * (1.0 + nodes)
+    force = facts.friction * facts.mass * facts.gravity * (1.0 - facts.lifted) + facts.falls.linear * v + facts.falls.quadratic * v * v
+    return float(0.5 * SLIDE * weights @ ((facts.mass + facts.armature) * v / force))
+
+
+def _creep(body: LooseBody, dt: float) -> list[Answer]:
+    """The speed of a body on a slope of half of its friction."""
+    facts = body.facts
+    slope = math.atan(0.5 * facts.friction)
+    gravity = facts.gravity * np.array([math.sin(slope), -math.cos(slope), 0.0])
+    start = settled(body, dt)[-1:]
+    start[:, VELOCITY] = start[:, SPIN] = 0.0
+    states = body.motions(start, dt, math.ceil(1.0 / dt), gravity, floor=True)[0]
+    if tilt(states) > UNTURNED:
+        return []
+    half = len(states) // 2
+    moved = float(np.linalg.norm((states[-1] - states[half])[POSITION]))
+    speed = moved / (dt * (len(states) - 1 - half))
+    return [Answer("slide", f"creep on a slope of {math.degrees(slope):.3g}°", "m/s", speed, physical=0.0)]
+
+
+def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
+    """The speed that a ball keeps as it rolls for a second."""
+    facts = body.facts
+    if (
+        not facts.surface
+        or not facts.gravity > 0.0
+        or len(facts.colliding) != 1
+        or not facts.colliding[0].shape.is_ball
+        or facts.offset.any()
+    ):
+        return []
+    radius, inertia = float(facts.colliding[0].shape.semi_axes[0]), float(facts.principal[0].mean())
+    kept = []
+    end = settled(body, dts[0])[-1]
+    for dt in dts:
+        start = end.copy()
+        start[VELOCITY], start[SPIN] = [1.0, 0.0, 0.0], [0.0, 0.0, -1.0 / radius]
+        kept.append(body.motions(start[np.newaxis], dt, round(1.0 / dt), -facts.gravity * UP, floor=True)[0, -1, VELOCITY][0])
+    name = "fraction kept in 1 s, from 1 m/s"
+    if facts.rolling or not facts.friction:
+        return [Answer("roll", name, "1", kept[0], physical=1.0)]
+    heavy = facts.mass + facts.armature + (inertia + facts.armature) / radius**2
+    drag = (facts.falls.linear + facts.spins[0].linear / radius**2, facts.falls.quadratic + facts.spins[0].quadratic / radius**3)
+    exact = float(spin_about_axis(1.0, 1.0, heavy, 0.0, *drag))
+    return [judged(body, "roll", name, "1", dts, kept, [exact] * len(dts), 1.0)]

@@ -1,0 +1,132 @@
+"""How a body lands and rests on a surface."""
+
+import math
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+
+from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, SETTLED, UNTURNED, WATCHED, Answer, Finding
+from dropspin.comparisons.diagnosis.loose_body import LooseBody
+from dropspin.comparisons.judging.error_budget import error_budget, is_sufficient
+from dropspin.scenarios.rotations import rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, UP, VELOCITY, Array
+
+IMPACTS = (0.5, 1.0, 3.0)  # m/s
+PHASES, FEWER = 8, 4
+"""Start phases at the file's time step, and at finer ones."""
+LEAST_NOISE = 1e-6  # of a ratio of speeds
+
+
+def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
+    """The rebound above the surface in the file's pose, over speeds and start phases; the depth and the time in contact at 1 m/s."""
+    facts, answers = body.facts, []
+    if not facts.surface or not facts.gravity > 0.0:
+        return []
+    at_1: list[Answer] = []
+    bodies = {"": body}
+    if "restitution" in body.remedies:
+        bodies["surface with restitution 1, "] = body.changed(body.remedies["restitution"][0])
+    for (name, one), speed in product(bodies.items(), IMPACTS):
+        found = [_rebounds(one, speed, dt, FEWER if number else PHASES) for number, dt in enumerate(dts)]
+        ratios, upward, depths, times = zip(*found, strict=True)
+        means = [float(np.mean(ratio)) for ratio in ratios]
+        noise = [max(float(np.ptp(ratio)) / math.sqrt(12.0) / len(ratio), LEAST_NOISE) for ratio in ratios]
+        limit = 0.0 if max(means) == 0.0 else math.nan
+        if is_sufficient(dts) and max(means) > 0.0:
+            budget = error_budget(dts, means, resolution=noise, signed=False, negligible=0.1 * NOTEWORTHY)
+            limit = math.nan if budget.cause == "unresolved" else budget.asymptotic_error
+        quantity = f"{name}rebound / impact speed at {speed:g} m/s"
+        exact = math.nan if one.facts.restitution is None else one.facts.restitution
+        change = abs(means[0] - (means[-1] if math.isnan(exact) else exact))
+        finding: Finding = "time step" if max(change, float(np.ptp(ratios[0]))) > NOTEWORTHY else ""
+        settings = ("timestep",) if finding else ()
+        if finding and not math.isnan(exact):
+            settings = ("contactERP", *settings)
+            if abs(means[-1] - exact) >= 0.6 * change:
+                finding = "model"
+        least, most = float(min(ratios[0])), float(max(ratios[0]))
+        answers.append(
+            Answer(
+                "impact",
+                quantity,
+                "1",
+                means[0],
+                exact,
+                limit=limit,
+                finding=finding,
+                least=least,
+                most=most,
+                settings=settings,
+            )
+        )
+        if speed == 1.0 and one is body:
+            longest = float(np.max(times[0]))
+            detail = f"> {WATCHED:g} s" if math.isinf(longest) else ""
+            ratio = float(np.mean(upward[0]))
+            ends = float(min(upward[0])), float(max(upward[0]))
+            at_1 = [Answer("impact", "largest upward / impact speed at 1 m/s", "1", ratio, least=ends[0], most=ends[1])]
+            at_1 += [Answer("impact", "penetration at 1 m/s", "m", float(np.max(depths[0])))]
+            at_1.append(Answer("impact", "contact at 1 m/s", "s", longest, detail=detail))
+    return answers + at_1
+
+
+def _rebounds(body: LooseBody, speed: float, dt: float, phases: int) -> tuple[Array, Array, Array, Array]:
+    """For each start phase: the rebound speed and the largest upward speed over the impact speed, depth [m] and time in contact [s].
+
+    The rebound speed is that which the height above the surface would need, which the body reaches from its speed as it leaves the surface.
+    """
+    facts = body.facts
+    g = facts.gravity
+    steps = math.ceil(WATCHED / dt)
+    gap = facts.margin
+    starts = [facts.start(height=gap + speed * dt * (phase + 0.5) / phases, velocity=-speed * UP) for phase in range(phases)]
+    ratios, fastest, depths, times = [], [], [], []
+    for states in body.motions(np.array(starts), dt, steps, -g * UP, floor=True):
+        heights = facts.lowest(states)
+        rows = np.arange(len(heights))
+        touched = int(np.argmax(heights < gap)) if (heights < gap).any() else len(heights) - 1
+        again = rows[(rows > touched) & (heights > gap)]
+        watched = int(again[0]) - touched if len(again) else len(rows)
+        lowest = touched + int(np.argmin(heights[touched : touched + min(watched, max(2, math.ceil(0.1 / dt)))]))
+        left = rows[(rows > lowest) & (heights > gap)]
+        upward = float(states[left[0], VELOCITY][1]) if len(left) else 0.0
+        energy = upward**2 + 2.0 * g * (heights[left[0]] - gap) if upward > 0.0 else 0.0
+        at_impact = math.sqrt(speed**2 + 2.0 * g * (heights[0] - gap))
+        ratios.append(math.sqrt(energy) / at_impact)
+        fastest.append(max(0.0, float(states[:, VELOCITY][:, 1].max())) / at_impact)
+        depths.append(max(0.0, -float(heights.min())))
+        times.append((left[0] - touched) * dt if len(left) else math.inf)
+    return np.array(ratios), np.array(fastest), np.array(depths), np.array(times)
+
+
+def settled(body: LooseBody, dt: float) -> Array:
+    """The states of the body that is put down in the file's pose, over three seconds, shape (n, 13)."""
+    facts = body.facts
+    return body.motions(facts.start()[np.newaxis], dt, math.ceil(SETTLED / dt), -facts.gravity * UP, floor=True)[0]
+
+
+def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
+    """The depth of the body at rest, and its speed there."""
+    facts = body.facts
+    if not facts.surface or not facts.gravity > 0.0:
+        return []
+    states = settled(body, dts[0])
+    last = states[-math.ceil(0.5 / dts[0]) :]
+    heights = facts.lowest(last)
+    depth = -float(heights.mean())
+    size = max(float(np.linalg.norm(facts.points, axis=1).max()), 1e-12)
+    floats = facts.margin > 0.0 and -depth > NOTEWORTHY * size
+    finding: Finding = "setting" if floats else ""
+    speed = float(np.linalg.norm(np.ptp(last[:, POSITION], axis=0))) / 0.5
+    tipped = tilt(states) > UNTURNED
+    return [
+        Answer("rest", "penetration", "m", depth, facts.rest_depth, 0.0, finding=finding, settings=("margin",) * floats),
+        Answer("rest", "drift speed", "m/s", speed, physical=0.0, detail="tips over" if tipped else ""),
+    ]
+
+
+def tilt(states: Array) -> float:
+    """The largest angle between the first vertical axis of a body and the later ones [rad]."""
+    up = unrotate(states[0, ORIENTATION], UP)
+    return float(np.arccos(np.clip(rotate(states[:, ORIENTATION], up)[:, 1], -1.0, 1.0)).max())

@@ -1,0 +1,50 @@
+"""The geometries of a compiled model of MuJoCo as shapes."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from dropspin.comparisons.diagnosis.loose_body import mesh_shape
+from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
+from dropspin.scenarios.state import Array
+
+MODELLED = [getattr(mujoco.mjtGeom, f"mjGEOM_{kind}") for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")]
+"""The kinds of geometries of bodies."""
+UPWARD = np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0])
+"""The rotation [w, x, y, z] that takes z to y."""
+STRAIGHT = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def shape_of(model: Any, number: int) -> tuple[Shape, Array, Array]:
+    """A geometry as a solid of 1 kg, with its centre [m] and its orientation in the frame of the geometry."""
+    size, kind = model.geom_size[number].tolist(), model.geom_type[number]
+    solid: dict[str, Any] = {"mass": 1.0, "inertia": "solid"}
+    along_z = np.roll(UPWARD, -1)  # capsules and cylinders are along y here
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return Sphere(shape="sphere", radius=size[0], **solid), np.zeros(3), STRAIGHT
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return Capsule(shape="capsule", radius=size[0], half_length=size[1], **solid), np.zeros(3), along_z
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return Cylinder(shape="cylinder", radius=size[0], half_length=size[1], **solid), np.zeros(3), along_z
+    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+        return Box(shape="box", half_extents=tuple(size), **solid), np.zeros(3), STRAIGHT
+    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+        return Ellipsoid(shape="ellipsoid", half_extents=tuple(size), **solid), np.zeros(3), STRAIGHT
+    shape = mesh_shape(*mesh_of(model, number))
+    return shape, shape.centre, STRAIGHT
+
+
+def mesh_of(model: Any, geom: int) -> tuple[Array, Any]:
+    """The vertices and the triangles of a mesh in the frame of its geometry."""
+    mesh = model.geom_dataid[geom]
+    first, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+    points = model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float)
+    return points, model.mesh_face[face : face + model.mesh_facenum[mesh]].astype(np.int64)
+
+
+def quaternion(matrix: Array) -> Array:
+    """The rotation of a matrix, shape (9,)."""
+    found = np.empty(4)
+    mujoco.mju_mat2Quat(found, matrix)
+    return np.roll(found, -1)

@@ -1,5 +1,6 @@
 """The trade-off study: the ladder of steps, the Pareto front, and the recommendation. No assertion depends on the machine's speed."""
 
+import mmap
 import os
 from itertools import pairwise
 
@@ -369,16 +370,23 @@ def test_accuracy_options_are_walked_beside_the_time_step():
     assert errors_at_coarsest["inner-step"] < 0.5 * errors_at_coarsest[f"inner-step[inner_step={1 / 240!r}]"]
 
 
+def _pages(size):
+    """Memory of the system's own, all of it in use; what malloc takes beyond it depends on what this process did before."""
+    memory = np.frombuffer(mmap.mmap(-1, size), np.uint8)
+    memory[:] = 1
+    return memory
+
+
 class Hoarding(BatchSimulation):
     """Worlds that do not move, each with 20 kB, and twice as much in every step."""
 
     def __init__(self, members):
         self._states = np.array([member.initial_state for member in members])
-        self._kept = np.ones((len(members), 2500))
+        self._kept = _pages(20_000 * len(members))
 
     def advance(self, steps):
         for _ in range(steps):
-            self._kept.copy()
+            _pages(20_000 * len(self._states))
 
     def states(self):
         return self._states

@@ -13,7 +13,7 @@ from dropspin.scenarios.rotations import rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.settings import spin_about_axis
 
-SLIDE = 0.5  # m/s, and more where friction would stop it within a quarter of a second
+SLIDE = 0.5  # m/s
 LONGEST_SLIDE = 5.0  # m
 LONG_SLIDE = 0.25  # s, within which a body stops
 ONE_WAY = 0.05
@@ -23,7 +23,7 @@ ONE_WAY = 0.05
 def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The distance in which a body that slides without tipping stops, along and at 45 degrees; and its creep on a slope that holds."""
     facts = body.facts
-    if not facts.surface or not facts.gravity > 0.0 or not facts.friction > 0.0:
+    if not facts.lands or not facts.friction > 0.0:
         return []
     free, exact = SLIDE**2 / (2.0 * facts.friction * facts.gravity), _stop(facts)
     if free > LONGEST_SLIDE:
@@ -92,13 +92,7 @@ def _creep(body: LooseBody, dt: float) -> list[Answer]:
 def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The speed that a ball keeps as it rolls for a second."""
     facts = body.facts
-    if (
-        not facts.surface
-        or not facts.gravity > 0.0
-        or len(facts.colliding) != 1
-        or not facts.colliding[0].shape.is_ball
-        or facts.offset.any()
-    ):
+    if not facts.lands or len(facts.colliding) != 1 or not facts.colliding[0].shape.is_ball or facts.offset.any():
         return []
     radius, inertia = float(facts.colliding[0].shape.semi_axes[0]), float(facts.principal[0].mean())
     kept = []

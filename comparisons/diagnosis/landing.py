@@ -21,7 +21,7 @@ LEAST_NOISE = 1e-6  # of a ratio of speeds
 def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The rebound above the surface in the file's pose, over speeds and start phases; the depth and the time in contact at 1 m/s."""
     facts, answers = body.facts, []
-    if not facts.surface or not facts.gravity > 0.0:
+    if not facts.lands:
         return []
     at_1: list[Answer] = []
     bodies = {"": body}
@@ -109,7 +109,7 @@ def settled(body: LooseBody, dt: float) -> Array:
 def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The depth of the body at rest, and its speed there."""
     facts = body.facts
-    if not facts.surface or not facts.gravity > 0.0:
+    if not facts.lands:
         return []
     states = settled(body, dts[0])
     last = states[-math.ceil(0.5 / dts[0]) :]

@@ -116,6 +116,11 @@ class Facts:
         """Heights of the body's lowest point at states, shape (n,) [m]."""
         return self._support.lowest(states)
 
+    @property
+    def lands(self) -> bool:
+        """Whether there is a surface that gravity holds the body on."""
+        return bool(self.surface) and self.gravity > 0.0
+
     @cached_property
     def _support(self) -> "Support":
         return Support(self.colliding)

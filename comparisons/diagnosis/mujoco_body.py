@@ -256,7 +256,7 @@ class MuJoCoBody(LooseBody):
             mass=float(old.body_mass[self._group].sum()),
             inertia=inertia,
             offset=self._offset,
-            parts=[self._part(geom) for geom in range(self._alone.ngeom)],
+            parts=self._parts,
             pose=pose,
             resistance=joint_damping(*self._damping),
             falls=drag,
@@ -275,6 +275,10 @@ class MuJoCoBody(LooseBody):
             ignored=list(self._text.ignored(inertia, raised=raised)),
             unmodelled=[words for field, words in UNMODELLED.items() if getattr(old, field, 0)],
         )
+
+    @cached_property
+    def _parts(self) -> list[Part]:
+        return [self._part(geom) for geom in range(self._alone.ngeom)]
 
     def _part(self, number: int) -> Part:
         """A geometry as a shape, relative to the centre of mass."""
@@ -315,7 +319,7 @@ class MuJoCoBody(LooseBody):
             return 0
         model = self._built(self._file.model.opt.timestep, np.zeros(3), True)
         data, size = mujoco.MjData(model), float(model.stat.extent)
-        parts = [part for number in range(self._alone.ngeom) if (part := self._part(number)).collides]
+        parts = [part for part in self._parts if part.collides]
         data.qpos[:] = [*(-rotate(pose, self._offset)), *np.roll(pose, 1)]
         data.qpos[1] -= Support(parts).lowest(np.concatenate([np.zeros(3), pose, np.zeros(6)])[np.newaxis])[0] + FLAT * size
         with quiet():

@@ -13,7 +13,7 @@ from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.source import read_source
 from dropspin.comparisons.engines.mujoco_simulation import quiet
 from dropspin.scenarios import DropspinError
-from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.truths.soft_rest import GeomSettings, mixed
 
 BODY, GEOM = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_GEOM
@@ -87,9 +87,7 @@ class MuJoCoFile:
             UnknownName: There is no such body.
             DropspinError: No body is free.
         """
-        for name in wanted:
-            if name not in self.heads:
-                raise UnknownName("the model's body", name, self.heads)
+        verify_known("the model's body", wanted, self.heads)
         heavy = [name for name, body in self.heads.items() if sum(self.model.body_mass[one] for one in self.group(body)) > 0.0]
         found = wanted or [name for name in heavy if loose or self.is_free(self.heads[name]) or (self.is_urdf and len(heavy) == 1)]
         if not found:
@@ -129,8 +127,7 @@ class MuJoCoFile:
         model = self.model
         others = {name: geom for name, geom in self.names(GEOM, model.ngeom).items() if geom not in own}
         if wanted is not None:
-            if wanted not in others:
-                raise UnknownName("the model's geometry", wanted, others)
+            verify_known("the model's geometry", [wanted], others)
             if int(model.geom_type[others[wanted]]) not in map(int, SURFACES):
                 raise DropspinError(f"--on {wanted}: is neither a plane nor a box; name one of these.")
             return others[wanted]

@@ -6,13 +6,12 @@ import mujoco
 import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import mesh_shape
+from dropspin.comparisons.engines.mujoco_model import UPWARD
 from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from dropspin.scenarios.state import Array
 
 MODELLED = [getattr(mujoco.mjtGeom, f"mjGEOM_{kind}") for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")]
 """The kinds of geometries of bodies."""
-UPWARD = np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0])
-"""The rotation [w, x, y, z] that takes z to y."""
 STRAIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile
 from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting
+from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
 
 SAME = 1e-6
@@ -49,14 +50,14 @@ class BodyText:
         values = inertial.attributes
         if self._file.is_urdf:
             values = next(inertial.every("inertia"), inertial).attributes
-            xx, yy, zz, xy, xz, yz = (float(values.get(name, 0.0)) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+            numbers = [float(values.get(name, 0.0)) for name in OF_URDF]
         elif "diaginertia" in values:
-            xx, yy, zz, xy, xz, yz = (*map(float, values["diaginertia"].split()), 0.0, 0.0, 0.0)
+            numbers = [*map(float, values["diaginertia"].split()), 0.0, 0.0, 0.0]
         elif "fullinertia" in values:
-            xx, yy, zz, xy, xz, yz = map(float, values["fullinertia"].split())
+            numbers = [float(value) for value in values["fullinertia"].split()]
         else:
             return None
-        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return np.array(symmetric(numbers))
 
     @cached_property
     def settings(self) -> dict[str, Setting]:

@@ -16,6 +16,7 @@ from dropspin.comparisons.engines.pybullet_simulation import Z_TO_Y
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Shape, Sphere
 from dropspin.scenarios.bodies.hull import convex_hull
+from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.rotations import conjugate, multiply, rotate
 from dropspin.scenarios.state import Array
 
@@ -66,8 +67,7 @@ class Link:
         element = next(self.element.every("inertia"), None)
         if element is None:
             return None
-        xx, yy, zz, xy, xz, yz = (element.number(name, 0.0) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
-        return self._turned(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+        return self._turned(np.array(symmetric([element.number(name, 0.0) for name in OF_URDF])))
 
     def _turned(self, tensor: Array) -> Array:
         axes = rotate(self.turn, np.eye(3)).T

@@ -145,5 +145,5 @@ def mjcf_setting(element: Element, attribute: str) -> Setting | None:
 
 def option_setting(root: Element, tag: str, attribute: str, default: str) -> Setting:
     """A global setting of a model, such as the time step: the last one written, or the engine's default."""
-    written = [element.setting(attribute) for element in root.every(tag) if attribute in element.attributes]
-    return written[-1] or Setting(default) if written else Setting(f'{attribute}="{default}"')
+    written = [setting for element in root.every(tag) if (setting := element.setting(attribute)) is not None]
+    return written[-1] if written else Setting(f'{attribute}="{default}"')

@@ -4,6 +4,7 @@ import math
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import product
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -193,9 +194,10 @@ def _around_mesh(path: Path, given: str, density: float, folder: Path) -> Path:
     return model
 
 
-def _file(entry: EngineEntry, path: Path, given: str) -> ModelFile:
-    """A model as the engine of this process reads it."""
-    if entry.adapter.name == "mujoco":
+@lru_cache(maxsize=1)
+def _file(engine: str, path: Path, given: str) -> ModelFile:
+    """A model as the engine of this process reads it, once for all bodies."""
+    if engine == "mujoco":
         from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
 
         return MuJoCoModel(path, given)
@@ -207,7 +209,7 @@ def _file(entry: EngineEntry, path: Path, given: str) -> ModelFile:
 def _bodies(entry: EngineEntry, path: Path, given: str, wanted: Sequence[str], loose: bool) -> list[str] | DropspinError:
     """The names of the bodies to diagnose; runs in the engine's process."""
     try:
-        return _file(entry, path, given).bodies(wanted, loose)
+        return _file(entry.adapter.name, path, given).bodies(wanted, loose)
     except DropspinError as error:  # of a type that may need more than a text
         return DropspinError(str(error))
 
@@ -215,7 +217,7 @@ def _bodies(entry: EngineEntry, path: Path, given: str, wanted: Sequence[str], l
 def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | None, targets: Targets) -> BodyDiagnosis | DropspinError:
     """The diagnosis of a body; runs in the engine's process."""
     try:
-        body = _file(entry, path, given).body(name, on)
+        body = _file(entry.adapter.name, path, given).body(name, on)
     except DropspinError as error:
         return DropspinError(str(error))
     facts = body.facts

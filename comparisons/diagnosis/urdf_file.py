@@ -7,7 +7,7 @@ from xml.sax.saxutils import quoteattr
 
 from dropspin.comparisons.diagnosis.source import Element, read_source
 from dropspin.scenarios import DropspinError
-from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.errors import verify_known
 
 FIXED = ("fixed", "floating")
 """Types of joints of which PyBullet makes fixed ones."""
@@ -54,9 +54,7 @@ class UrdfFile:
             UnknownName: There is no such body.
             DropspinError: No body is free.
         """
-        for name in wanted:
-            if name not in self.heads:
-                raise UnknownName("the model's body", name, self.heads)
+        verify_known("the model's body", wanted, self.heads)
         if not wanted and not loose and len(self.heads) > 1:
             joined = f"{', '.join(self.heads)} are joined"
             raise DropspinError(f"{self.given}: no body is free: {joined}; name one with --body, or give --loose for all.")

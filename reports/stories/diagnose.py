@@ -127,9 +127,8 @@ def answer_rows(body: BodyDiagnosis) -> list[dict[str, str]]:
     shown = [answer for answer in body.answers if answer not in moments and answer.question not in ("file", "friction")]
     shown = [answer for answer in shown if answer.question != "inertia" or answer.finding]
     for _, group in groupby(shown, lambda answer: (answer.question, _cells(answer), SEVERAL.split(answer.quantity)[0])):
-        first, *others = group
-        quantity = ", ".join([first.quantity, *(SEVERAL.split(other.quantity)[-1] for other in others)])
-        rows.append(_row(body, first.question, quantity, *_cells(first), KINDS.get(first.finding, "")))
+        same = list(group)
+        rows.append(_row(body, same[0].question, _together(same), *_cells(same[0]), KINDS.get(same[0].finding, "")))
     return rows
 
 
@@ -164,7 +163,7 @@ def sentences(body: BodyDiagnosis) -> list[str]:
     found = []
     for _, group in groupby(body.findings, lambda answer: (answer.question, answer.finding, answer.settings, _texts(answer))):
         same = list(group)
-        what = "; ".join(f"{_together(quantities)} {told}" for told, quantities in grouped_quantities(same).items())
+        what = "; ".join(f"{_together(answers)} {statement}" for statement, answers in grouped(same, _statement).items())
         where = ", ".join(_settings(body, same[0]))
         sentence = f"{same[0].question.capitalize()}, {KINDS[same[0].finding]}: {what}" + (f": {where}." if where else ".")
         found.append(" ".join([sentence, *_remedies(same)]))
@@ -175,9 +174,10 @@ def _texts(answer: Answer) -> tuple[str, ...]:
     return tuple(remedy.text for remedy in answer.remedies)
 
 
-def _together(quantities: Sequence[str]) -> str:
-    """Quantities that differ in an axis or a speed, as one."""
-    return ", ".join([quantities[0], *(SEVERAL.split(quantity)[-1] for quantity in quantities[1:])])
+def _together(answers: Sequence[Answer]) -> str:
+    """The quantities of answers that differ in an axis or a speed, as one."""
+    first, *others = (answer.quantity for answer in answers)
+    return ", ".join([first, *(SEVERAL.split(quantity)[-1] for quantity in others)])
 
 
 def _remedies(answers: Sequence[Answer]) -> list[str]:
@@ -193,20 +193,13 @@ def _remedies(answers: Sequence[Answer]) -> list[str]:
     return found
 
 
-def grouped_quantities(answers: Sequence[Answer]) -> dict[str, list[str]]:
-    """The quantities of answers by what is said of them."""
-    found: dict[str, list[str]] = {}
-    for answer in answers:
-        found.setdefault(_told(answer), []).append(answer.quantity)
-    return found
-
-
 def _value_after(value: float, answer: Answer) -> str:
     """A value that was measured with a remedy: a spin that does not decay has no time to 1/e, but a fraction that is kept."""
     return f"a fraction of {value:.4g} kept in 1 s" if answer.unit == "s" and answer.question == "spin" else _value(value, answer.unit)
 
 
-def _told(answer: Answer) -> str:
+def _statement(answer: Answer) -> str:
+    """What a sentence states of a quantity."""
     measured, in_force, physical = _cells(answer)
     if answer.finding == "impossible":
         return f"is {measured}, but at most 1 for {answer.detail}"

@@ -1,7 +1,7 @@
 """Moments and tensors of inertia, of any shape."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -21,6 +21,12 @@ def _possible(moments: tuple[float, ...]) -> tuple[float, ...]:
     return moments
 
 
+def symmetric(values: Sequence[Any]) -> list[list[Any]]:
+    """The rows of a symmetric matrix of which xx, yy, zz, xy, xz, yz are given."""
+    xx, yy, zz, xy, xz, yz = values
+    return [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+
+
 def _moments(given: Any, validate: Callable[[Any], Any]) -> Any:
     """A tensor as its rows, given so, as six numbers or with the names of URDF; anything else as `validate` does.
 
@@ -30,8 +36,7 @@ def _moments(given: Any, validate: Callable[[Any], Any]) -> Any:
     if isinstance(given, Mapping) and set(given) == set(OF_URDF):
         given = [given[name] for name in OF_URDF]
     if isinstance(given, list | tuple) and len(given) == 6:
-        xx, yy, zz, xy, xz, yz = given
-        given = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+        given = symmetric(given)
     if not (isinstance(given, list | tuple) and len(given) == 3 and all(isinstance(row, list | tuple) for row in given)):
         return validate(given)
     if not all(len(row) == 3 and all(type(value) in (int, float) and abs(value) <= LARGEST for value in row) for row in given):

@@ -71,7 +71,7 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         SceneError: The scene is not valid. The message gives the file or mapping, the key, the value and the allowed values.
     """
     if isinstance(scene, Mapping):
-        return _plausible(from_mapping(_with_mesh(dict(scene), Path())), "scene")
+        return _plausible(from_mapping(with_mesh(dict(scene), Path())), "scene")
     if not isinstance(scene, str | Path):
         raise SceneError(f"scene: got {shown(scene)} ({type(scene).__name__}); give a catalogue name, a path or a mapping.")
     if isinstance(scene, str) and (drawn := re.fullmatch(DRAWN, scene)):
@@ -85,11 +85,11 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         str(path).encode()
     except UnicodeEncodeError:
         raise SceneError(f"{str(path)!a}: the file's name is not UTF-8 text; rename it.") from None
-    loaded = from_table(path.stem, str(scene), _with_mesh(read_toml(path, str(scene)), path.parent))
+    loaded = from_table(path.stem, str(scene), with_mesh(read_toml(path, str(scene)), path.parent))
     return loaded if path.parent == CATALOGUE else _plausible(loaded, str(scene))
 
 
-def _with_mesh(content: dict[str, Any], folder: Path) -> dict[str, Any]:
+def with_mesh(content: dict[str, Any], folder: Path) -> dict[str, Any]:
     """The content of a scene's file with the mesh that `body.file` names, relative to the folder of the file, times `body.scale`."""
     body = content.get("body")
     if not isinstance(body, Mapping) or body.get("shape") != "mesh" or "file" not in body:

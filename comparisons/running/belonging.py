@@ -15,6 +15,7 @@ from dropspin.comparisons.faults.fault_model import unchanged_scene
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth
 from dropspin.scenarios.rotations import angle_between_orientations
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios.text import counted
 
 Array = NDArray[np.float64]
 
@@ -38,14 +39,26 @@ def verify_motion(scene: Scenario, truth: Truth | None, motion: Trajectory) -> N
         raise DropspinError(f"motion: {problem}.")
 
 
-def _of_times(motion: Trajectory) -> Iterator[str]:
-    if len(motion) < 2:
-        yield f"got {len(motion)} states; give at least two"
+def problems_of_order(t: Array) -> Iterator[str]:
+    """What is wrong with the number and the order of the times [s] of a motion, shape (n,)."""
+    if len(t) < 2:
+        yield f"got {counted(len(t), 'state')}; give at least two"
         return
-    steps = np.diff(motion.t)
+    steps = np.diff(t)
     if not (steps > 0.0).all():
-        yield "the times do not increase; give the states in the order of time"
-    elif np.ptp(steps) > UNEVEN * steps.mean():
+        row = int(np.argmin(steps > 0.0))
+        yield f"the times do not increase: {t[row + 1]:.6g} s is after {t[row]:.6g} s; give the states in the order of time"
+
+
+def is_uneven(steps: Array) -> bool:
+    """Whether steps of time [s], shape (n,), differ by more than the rounding of a text explains."""
+    return bool(len(steps)) and float(np.ptp(steps)) > UNEVEN * float(steps.mean())
+
+
+def _of_times(motion: Trajectory) -> Iterator[str]:
+    yield from problems_of_order(motion.t)
+    steps = np.diff(motion.t)
+    if is_uneven(steps):
         yield (
             f"the times are not equally spaced: steps are {steps.min():.4g} to {steps.max():.4g} s long; interpolate the states at equal "
             "steps, or give times without rounding"

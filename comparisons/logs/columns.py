@@ -1,0 +1,165 @@
+"""The columns of a recording's data as arrays, from CSV, Parquet, NPZ or MCAP; what is wrong with such a file is one line."""
+
+import io
+import json
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from dropspin.scenarios.errors import DropspinError, did_you_mean
+from dropspin.scenarios.files import read_file
+from dropspin.scenarios.state import Array
+from dropspin.scenarios.text import printable
+from dropspin.scenarios.validation import shown
+
+POSITION = ("x", "y", "z")
+ORIENTATION = ("qx", "qy", "qz", "qw")
+VELOCITY = ("vx", "vy", "vz")
+SPIN = ("wx", "wy", "wz")
+TOSS = "toss"
+NUMBERS = ("t", *POSITION, *ORIENTATION, *VELOCITY, *SPIN)
+REQUIRED = {*POSITION, *ORIENTATION}
+LARGEST_FILE = 200_000_000  # bytes
+MOST_ROWS = 1_000_000
+LONGEST_NAME = 100
+"""Characters of the name of a toss."""
+DAMAGED = (ValueError, ArithmeticError, LookupError, OSError, RuntimeError, TypeError, struct.error, zipfile.BadZipFile, zlib.error)
+"""What the libraries raise for a damaged file."""
+Columns = dict[str, Any]
+"""By name, a sequence of one value a row."""
+
+
+def read_columns(path: Path, given: str, topic: str | None) -> tuple[dict[str, Array], NDArray[np.str_]]:
+    """The columns of a file of data.
+
+    Args:
+        path: The file.
+        given: The path as the user gave it, for messages.
+        topic: The topic of an MCAP file; None for its only one.
+
+    Returns:
+        The columns of numbers by name, and the names of the tosses, each of one length; all numbers are finite.
+
+    Raises:
+        DropspinError: The file is absent, damaged, too large or of another format, or has other columns, or values that are no numbers.
+    """
+    readers: dict[str, Callable[[bytes, str], Columns]] = {
+        ".csv": _csv,
+        ".parquet": _parquet,
+        ".npz": _npz,
+        ".mcap": lambda raw, given: _mcap(raw, given, topic),
+    }
+    ending = path.suffix.lower()
+    if ending not in readers:
+        raise DropspinError(f"{given}: is not the data of a recording; give a file that ends in {', '.join(readers)}.")
+    raw = read_file(path, given, "recording", LARGEST_FILE)
+    try:
+        columns = readers[ending](raw, given)
+    except DAMAGED as error:
+        detail = printable(" ".join(str(error).split()) or type(error).__name__)
+        raise DropspinError(f"{given}: is not {ending[1:].upper()}, or damaged: {detail:.200}.") from None
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise DropspinError(f"{given}: the columns have different lengths: {shown(lengths)}; give one value a row.")
+    count = lengths["x"]
+    names = np.array([_name(value) for value in columns.pop(TOSS, ["1"] * count)])
+    return {name: _numbers(given, name, values) for name, values in columns.items()}, names
+
+
+def _verify(given: str, names: Collection[str], rows: int = 0) -> None:
+    """Raise `DropspinError` for other columns than those of a recording, or too many rows."""
+    known = (*NUMBERS, TOSS)
+    for name in names:
+        if name not in known:
+            raise DropspinError(f"{given}: column {shown(name)} is unknown.{did_you_mean(name, known)} Allowed: {', '.join(known)}.")
+    partly = {name for group in (VELOCITY, SPIN) if not set(group).isdisjoint(names) for name in group}
+    if missing := [name for name in NUMBERS if name in REQUIRED | partly and name not in names]:
+        raise DropspinError(f"{given}: has no column {', '.join(missing)}; {'it has ' + ', '.join(names) if names else 'it has none'}.")
+    if rows > MOST_ROWS:
+        raise DropspinError(f"{given}: has more than {MOST_ROWS:,} rows, the limit for a recording; give fewer tosses.")
+
+
+def _csv(raw: bytes, given: str) -> Columns:
+    names = [str(name) for name in pd.read_csv(io.BytesIO(raw), nrows=0, index_col=False, skipinitialspace=True).columns]
+    _verify(given, names)
+    options: dict[str, Any] = {"dtype": {TOSS: str}, "low_memory": False}
+    table = pd.read_csv(io.BytesIO(raw), nrows=MOST_ROWS + 1, index_col=False, skipinitialspace=True, **options)
+    _verify(given, names, len(table))
+    return {name: table[name] for name in names}
+
+
+def _parquet(raw: bytes, given: str) -> Columns:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    file = pq.ParquetFile(io.BytesIO(raw))
+    _verify(given, file.schema_arrow.names, file.metadata.num_rows)
+    table = file.read()
+    # Decimals, which are integers with a unit of 0.1^n, are as small as integers and stay what their writer rounded to.
+    decimals = {name for name in table.column_names if pa.types.is_decimal(table.schema.field(name).type)}
+    return {name: (table[name].cast(pa.float64()) if name in decimals else table[name]).to_pandas() for name in table.column_names}
+
+
+def _npz(raw: bytes, given: str) -> Columns:
+    with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+        _verify(given, [name.removesuffix(".npy") for name in archive.namelist()])
+        for name in archive.namelist():
+            with archive.open(name) as member:  # its head alone, which says how large it is
+                read_head = npy.read_array_header_1_0 if npy.read_magic(member) == (1, 0) else npy.read_array_header_2_0
+                shape, _, dtype = read_head(member)
+            if len(shape) != 1 or dtype.kind not in "fiuU" or dtype.itemsize > 4 * LONGEST_NAME:
+                raise DropspinError(f"{given}: {name.removesuffix('.npy')} has shape {shape} and type {dtype}; give one number a row.")
+            _verify(given, list(NUMBERS), shape[0])
+    with np.load(io.BytesIO(raw), allow_pickle=False) as arrays:
+        return dict(arrays)
+
+
+def _mcap(raw: bytes, given: str, topic: str | None) -> Columns:
+    try:
+        from mcap.exceptions import McapError
+        from mcap.reader import make_reader
+        from zstandard import ZstdError
+    except ImportError:
+        raise DropspinError(f"{given}: MCAP files need a package that is not installed: pip install 'dropspin[mcap]'.") from None
+    rows: list[Any] = []
+    topics: dict[str, str] = {}
+    try:
+        for _, channel, message in make_reader(io.BytesIO(raw)).iter_messages(topic, log_time_order=False):
+            topics[channel.topic] = channel.message_encoding
+            rows.append(json.loads(message.data) if channel.message_encoding == "json" else {})
+            if len(topics) > 1:
+                raise DropspinError(f"{given}: has several topics ({', '.join(topics)}); name one in the header, as topic.")
+            if not isinstance(rows[-1], dict) or channel.message_encoding != "json":
+                raise DropspinError(f"{given}: a message of topic {channel.topic} is not a JSON object of the columns.")
+            _verify(given, rows[0], len(rows))
+    except (McapError, ZstdError) as error:
+        raise ValueError(str(error) or type(error).__name__) from None
+    if not rows:
+        raise DropspinError(f"{given}: has no message{'' if topic is None else f' of topic {topic}'}.")
+    return dict(pd.DataFrame.from_records(rows, columns=list(rows[0])))
+
+
+def _numbers(given: str, name: str, values: Any) -> Array:
+    """A column as numbers, all finite."""
+    column = pd.Series(values)
+    numbers = pd.to_numeric(column, errors="coerce") if column.dtype != bool else pd.Series(np.full(len(column), np.nan))
+    found = numbers.to_numpy(dtype=float, na_value=np.nan)
+    if not (finite := np.isfinite(found)).all():
+        row = int(np.argmin(finite))
+        value = column.iloc[row : row + 1].tolist()[0]  # as a number of Python
+        text = "no number" if pd.isna(value) else shown(value)
+        raise DropspinError(f"{given}: column {name}: row {row + 1} has {text}; give a finite number, or leave out rows without tracking.")
+    return found
+
+
+def _name(value: Any) -> str:
+    """The name of a toss: a whole number, or a text."""
+    return f"{value:g}" if isinstance(value, float) else str(value)[:LONGEST_NAME]

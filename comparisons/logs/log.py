@@ -1,0 +1,257 @@
+"""A recording: its header, a TOML file, and its tosses in SI units, y up, quaternions [x, y, z, w] from body to world.
+
+What the file shows by itself, without the laws of motion, are facts: rows that repeat, missing frames, uneven times, another rate.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from dropspin.comparisons.logs.columns import ORIENTATION, POSITION, SPIN, VELOCITY, read_columns
+from dropspin.comparisons.running.belonging import is_uneven, problems_of_order
+from dropspin.scenarios.bodies import Body
+from dropspin.scenarios.errors import DropspinError, UnknownName
+from dropspin.scenarios.loading import read_toml, with_mesh
+from dropspin.scenarios.rotations import conjugate, dot, length, multiply, rotate
+from dropspin.scenarios.state import Array
+from dropspin.scenarios.surfaces import Floor
+from dropspin.scenarios.tables import Number, Positive, Table, Vector
+from dropspin.scenarios.text import Text
+from dropspin.scenarios.validation import validated
+
+SHIPPED = Path(__file__).parents[2] / "scenarios" / "recordings"
+LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "foot": 0.3048}
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+HALF = np.sqrt(0.5)
+UPRIGHT = {
+    "x": (0.0, 0.0, HALF, HALF),
+    "-x": (0.0, 0.0, -HALF, HALF),
+    "y": (0.0, 0.0, 0.0, 1.0),
+    "-y": (1.0, 0.0, 0.0, 0.0),
+    "z": (-HALF, 0.0, 0.0, HALF),
+    "-z": (HALF, 0.0, 0.0, HALF),
+}
+"""The rotation, a quaternion, that takes the upward axis of a recording to y."""
+NEAR_UNIT = 0.05
+"""Largest difference from 1 of the length of a quaternion; two digits round it by 0.01."""
+GAP = 1.5
+"""Frame intervals from which a step of the times has a missing frame."""
+MOVES = 0.1
+"""Share of a toss's largest step from which a body moves: below, rounding may repeat a row."""
+OTHER_RATE = 2e-3
+"""Relative difference of two rates that is none of rounding."""
+
+
+class Noise(Table):
+    """Standard deviations of the noise of a recording, of one frame [m, rad]."""
+
+    position: Positive
+    orientation: Positive
+
+
+class Header(Table):
+    """The header of a recording.
+
+    Attributes:
+        data: The file with the columns, relative to the header's folder.
+        topic: The topic of an MCAP file with several.
+        body: As in a scene.
+        floor: As in a scene, or None.
+        rate: Frames in a second [1/s]; needed without a column `t`.
+        up: The upward axis of the recording.
+        quaternion: The meaning of the columns qx, qy, qz, qw in the order of the four: `wxyz` if the first of them is the scalar part.
+        rotation: What the quaternion takes to what.
+        spin_frame: The frame of the columns wx, wy, wz.
+        length_unit: The unit of x, y, z.
+        time_unit: The unit of t, and of the velocities.
+        length_scale: The recorded lengths over the true ones.
+        tracked_point: The point whose position is recorded, in the frame in which the shape is given [m].
+        floor_height: The height of the floor in the recording's frame, true length [m].
+        gravity: The true acceleration of gravity [m/s²].
+        noise: If it is known.
+    """
+
+    data: Annotated[Text, Field(min_length=1)]
+    topic: Text | None = None
+    source: Text = ""
+    body: Body
+    floor: Floor | None = None
+    rate: Positive | None = None
+    up: Literal["x", "-x", "y", "-y", "z", "-z"] = "y"
+    quaternion: Literal["xyzw", "wxyz"] = "xyzw"
+    rotation: Literal["body-to-world", "world-to-body"] = "body-to-world"
+    spin_frame: Literal["world", "body"] = "world"
+    length_unit: Literal["m", "cm", "mm", "inch", "foot"] = "m"
+    time_unit: Literal["s", "ms", "us", "ns"] = "s"
+    length_scale: Positive = 1.0
+    tracked_point: Vector = (0.0, 0.0, 0.0)
+    floor_height: Number = 0.0
+    gravity: Positive = 9.81
+    noise: Noise | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Toss:
+    """One throw of a body, in SI units, y up, the floor at y = 0.
+
+    Attributes:
+        name: The value of the column `toss`.
+        t: Times from that of the first frame [s], shape (n,).
+        position: The tracked point [m], shape (n, 3).
+        orientation: Unit quaternions [x, y, z, w], body to world, without jumps of sign, shape (n, 4).
+        velocity: Of the tracked point [m/s], shape (n, 3), or None.
+        angular_velocity: In the world frame [rad/s], shape (n, 3), or None.
+    """
+
+    name: str
+    t: Array
+    position: Array
+    orientation: Array
+    velocity: Array | None = None
+    angular_velocity: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+
+@dataclass(frozen=True)
+class Irregularity:
+    """What a file shows by itself.
+
+    Attributes:
+        kind: `repeated`: a row repeats the one before while the body moves; `gap`: frames are missing; `jitter`: the times are uneven;
+            `rate`: the times have another rate than the header.
+        toss: The name of the toss; empty for `rate`.
+        frame: The frame of the toss, from 0, at which it begins; for `jitter`, the one after the step that differs most.
+        value: The number of rows or of missing frames, the step that differs most [s], or the rate of the times [1/s].
+        expected: 0, the usual step [s], or the rate of the header [1/s].
+    """
+
+    kind: Literal["repeated", "gap", "jitter", "rate"]
+    toss: str
+    frame: int
+    value: float
+    expected: float
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """A recording.
+
+    Attributes:
+        header: What its header says.
+        tosses: In the order of the file.
+        origin: The argument of `load_log`.
+        irregularities: What the file shows by itself.
+    """
+
+    header: Header
+    tosses: tuple[Toss, ...]
+    origin: str
+    irregularities: tuple[Irregularity, ...]
+
+
+def log_names() -> list[str]:
+    """The names of the recordings that dropspin has."""
+    return sorted(path.stem for path in SHIPPED.glob("*.toml"))
+
+
+def load_log(recording: str | Path) -> Log:
+    """Load a recording.
+
+    Args:
+        recording: The path of its header, a TOML file, or the name of one that dropspin has.
+
+    Raises:
+        DropspinError: A file is absent, damaged or too large, a key or a column is wrong, or the values cannot be a recording's.
+    """
+    given = str(recording)
+    path = SHIPPED / f"{given}.toml" if given in log_names() else Path(recording)
+    if not path.suffix and not path.exists():
+        raise UnknownName("recording", given, log_names())
+    if path.suffix.lower() in (".csv", ".parquet", ".npz", ".mcap"):
+        raise DropspinError(f"{given}: is the data of a recording; give its header, a TOML file with the keys data and [body].")
+    header = validated(Header, given, with_mesh(read_toml(path, given, "recording"), path.parent))
+    columns, names = read_columns(path.parent / header.data, str(Path(given).parent / header.data), header.topic)
+    where = f"{given}: data"
+    if not len(names):
+        raise DropspinError(f"{where}: has no rows; give a row for each frame.")
+    if "t" not in columns and header.rate is None:
+        raise DropspinError(f"{given}: neither a column t nor the key rate says when the frames were taken; give one.")
+    labels, first, index = np.unique(names, return_index=True, return_inverse=True)
+    tosses = [_toss(where, header, str(labels[number]), columns, np.flatnonzero(index == number)) for number in np.argsort(first)]
+    return Log(header, tuple(tosses), given, tuple(_irregularities(header, tosses, "t" in columns)))
+
+
+def _toss(where: str, header: Header, name: str, columns: dict[str, Array], rows: NDArray[np.intp]) -> Toss:
+    """The rows of a toss in SI units and dropspin's conventions."""
+
+    def of(group: tuple[str, ...]) -> Array:
+        return np.column_stack([columns[column][rows] for column in group])
+
+    t = columns["t"][rows] * TIMES[header.time_unit] if "t" in columns else np.arange(len(rows)) / (header.rate or 1.0)
+    for problem in problems_of_order(t):
+        raise DropspinError(f"{where}: toss {name}: {problem}.")
+    quaternions = of(ORIENTATION)
+    lengths = length(quaternions)
+    if (off := np.abs(lengths - 1.0) > NEAR_UNIT).any():
+        raise DropspinError(
+            f"{where}: toss {name}: the quaternion of row {rows[np.argmax(off)] + 1} has length {lengths[np.argmax(off)]:.3g}; "
+            "give unit quaternions."
+        )
+    upright, scale = np.array(UPRIGHT[header.up]), LENGTHS[header.length_unit] / header.length_scale
+    orientation = quaternions / lengths[:, None]
+    orientation = np.roll(orientation, -1, axis=1) if header.quaternion == "wxyz" else orientation
+    orientation = conjugate(orientation) if header.rotation == "world-to-body" else orientation
+    position = scale * rotate(upright, of(POSITION)) - [0.0, header.floor_height, 0.0]
+    spin = None
+    if SPIN[0] in columns:
+        spin = of(SPIN) / TIMES[header.time_unit]
+        spin = rotate(upright, rotate(orientation, spin) if header.spin_frame == "body" else spin)
+    velocity = scale / TIMES[header.time_unit] * rotate(upright, of(VELOCITY)) if VELOCITY[0] in columns else None
+    return Toss(name, t - t[0], position, _without_jumps(multiply(upright, orientation)), velocity, spin)
+
+
+def _without_jumps(quaternions: Array) -> Array:
+    """The quaternions with the signs for which neighbours are near each other."""
+    signs = np.where(dot(quaternions[1:], quaternions[:-1]) < 0.0, -1.0, 1.0)
+    return quaternions * np.cumprod(np.concatenate([[1.0], signs]))[:, None]
+
+
+def _irregularities(header: Header, tosses: list[Toss], has_times: bool) -> Iterator[Irregularity]:
+    """What the rows and the times show; without a column of times, the rows alone."""
+    for toss in tosses:
+        yield from _repeated(toss)
+        if has_times:
+            yield from _uneven(toss)
+    rate = 1.0 / float(np.median(np.concatenate([np.diff(toss.t) for toss in tosses])))
+    if has_times and header.rate is not None and abs(rate / header.rate - 1.0) > OTHER_RATE:
+        yield Irregularity("rate", "", 0, rate, header.rate)
+
+
+def _repeated(toss: Toss) -> Iterator[Irregularity]:
+    """Runs of equal rows between frames in which the body moves."""
+    steps = length(np.diff(toss.position, axis=0))
+    equal = (steps == 0.0) & (np.diff(toss.orientation, axis=0) == 0.0).all(axis=1)
+    moves = steps > MOVES * steps.max()
+    [edges] = np.nonzero(np.diff(np.concatenate([[False], equal, [False]])))
+    for begin, end in edges.reshape(-1, 2):
+        if begin > 0 and end < len(steps) and moves[begin - 1] and moves[end]:
+            yield Irregularity("repeated", toss.name, int(begin) + 1, float(end - begin), 0.0)
+
+
+def _uneven(toss: Toss) -> Iterator[Irregularity]:
+    """Missing frames, and times that are not equally spaced beside them."""
+    steps = np.diff(toss.t)
+    usual = float(np.median(steps))
+    wide = steps > GAP * usual
+    for frame in np.flatnonzero(wide):
+        yield Irregularity("gap", toss.name, int(frame) + 1, float(np.rint(steps[frame] / usual)) - 1.0, 0.0)
+    if is_uneven(steps[~wide]):
+        worst = int(np.argmax(np.where(wide, 0.0, np.abs(steps - usual))))
+        yield Irregularity("jitter", toss.name, worst + 1, float(steps[worst]), usual)

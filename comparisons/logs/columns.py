@@ -154,8 +154,8 @@ def _numbers(given: str, name: str, values: Any) -> Array:
     found = numbers.to_numpy(dtype=float, na_value=np.nan)
     if not (finite := np.isfinite(found)).all():
         row = int(np.argmin(finite))
-        value = column.iloc[row : row + 1].tolist()[0]  # as a number of Python
-        text = "no number" if pd.isna(value) else shown(value)
+        value: Any = column.iloc[row : row + 1].tolist()[0]  # as a number of Python
+        text: str = "no number" if pd.isna(value) else shown(value)
         raise DropspinError(f"{given}: column {name}: row {row + 1} has {text}; give a finite number, or leave out rows without tracking.")
     return found
 

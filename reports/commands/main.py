@@ -48,8 +48,8 @@ GROUPS = {
     },
 }
 COMMANDS = {name: line for group in GROUPS.values() for name, line in group.items()}
-"""The commands, each in `reports/commands/`, in a file with the last word of its name (`-` is `_` there); with their lines in the help."""
-MOVED = {name.rpartition(" ")[2]: name for name in COMMANDS if " " in name}
+"""The commands, each in `reports/commands/`, in a file of its name with `_` for `-` and for spaces; with their lines in the help."""
+MOVED = {name.rpartition(" ")[2]: name for name in ("compare history", "symmetries twins", "record rerun", "record publish")}
 """The commands that were commands of their own in earlier versions."""
 VERSION = """dropspin, version %(version)s
 To cite: The dropspin authors, dropspin, version %(version)s;
@@ -165,7 +165,7 @@ class _LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        module = cmd_name.rpartition(" ")[2].replace("-", "_")
+        module = cmd_name.replace("-", "_").replace(" ", "_")
         command: click.Command = getattr(import_module(f"dropspin.reports.commands.{module}"), f"{module}_command")
         return command
 

@@ -128,7 +128,7 @@ def test_help_lists_every_command(arguments, tmp_path):
     listed = (done.stdout + done.stderr).partition("Use:\n")[2]
     names = [line.strip().split("  ")[0] for line in listed.splitlines() if line.startswith("  ") and not line.startswith("   ")]
     assert names == list(cli.COMMANDS)
-    assert all(Path(cli.__file__).with_name(f"{name.split()[-1].replace('-', '_')}.py").is_file() for name in names)
+    assert all(Path(cli.__file__).with_name(f"{name.replace('-', '_').replace(' ', '_')}.py").is_file() for name in names)
 
 
 @pytest.mark.parametrize("name", cli.COMMANDS)

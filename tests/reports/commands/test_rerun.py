@@ -9,7 +9,7 @@ from support.small_record import HOSTILE, rows, write_record
 from dropspin.comparisons.record import rerun
 from dropspin.comparisons.record.store import machine
 from dropspin.comparisons.running.recording import Breakdown
-from dropspin.reports.commands.rerun import rerun_command
+from dropspin.reports.commands.record_rerun import record_rerun_command
 from dropspin.scenarios import DropspinError
 
 CELL = ("mujoco[profile=default]", "3.10.0", "spin-asymmetric")
@@ -28,7 +28,7 @@ def again(tmp_path, monkeypatch):
 
         monkeypatch.setattr(rerun, "measured", measured)
         monkeypatch.setattr(rerun, "machine", lambda: machine() | ({"processor": processor} if processor else {}))
-        return CliRunner().invoke(rerun_command, [*cell, "-r", str(tmp_path), *options], standalone_mode=False)
+        return CliRunner().invoke(record_rerun_command, [*cell, "-r", str(tmp_path), *options], standalone_mode=False)
 
     return run
 
@@ -93,4 +93,4 @@ def test_release_that_can_no_longer_be_installed(tmp_path, monkeypatch):
 
     monkeypatch.setattr(rerun, "measured", measured)
     with pytest.raises(DropspinError, match=r"^mujoco 3\.10\.0: not installable: no wheel\.$"):
-        raise CliRunner().invoke(rerun_command, [*CELL, "-r", str(tmp_path)], standalone_mode=False).exception
+        raise CliRunner().invoke(record_rerun_command, [*CELL, "-r", str(tmp_path)], standalone_mode=False).exception

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True)
 @output_option("out/history", "for the table and the plots")
 @as_json
-def history_command(runs: tuple[str, ...], output: str, json_output: bool) -> None:
+def compare_history_command(runs: tuple[str, ...], output: str, json_output: bool) -> None:
     """Follow each result over runs, commits and versions of engines, and find the runs in which results changed.
 
     RUN is a folder that dropspin run -o wrote, or a folder of such folders. Runs are sorted by start time.

@@ -14,7 +14,7 @@ from dropspin.reports.commands.options import as_json, jobs_option, step_option,
 @time_limit_option(60.0, "an engine may use for one scene")
 @jobs_option("scenes to run")
 @as_json
-def twins_command(json_output: bool, **options: Any) -> None:
+def symmetries_twins_command(json_output: bool, **options: Any) -> None:
     """Find the time step from which engines of the same algorithm differ, such as MuJoCo and its port to a GPU.
 
     The motions of each pair of engines are compared at every time step: from which step on they differ at all, by how much before and

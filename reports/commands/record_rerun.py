@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 @click.option("-r", "--record", "folder", default="record", metavar="DIR", help="Folder of the record.")
 @time_limit_option(60.0, "the engine may use for one simulation")
 @as_json
-def rerun_command(engine: str, release: str, scene: str, folder: str, resources: "ResourceLimits", json_output: bool) -> int:
+def record_rerun_command(engine: str, release: str, scene: str, folder: str, resources: "ResourceLimits", json_output: bool) -> int:
     """Measure a cell of the record again, and compare it bit for bit.
 
     ENGINE is an engine with options, RELEASE a release of it and SCENE a scene, as in the record. pip installs the release into a

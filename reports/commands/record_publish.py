@@ -12,7 +12,7 @@ from dropspin.reports.terminal.safe import echo
 @click.command("publish")
 @click.argument("record", default="record")
 @output_option("out/site-record", "of the site")
-def publish_command(record: str, output: str) -> None:
+def record_publish_command(record: str, output: str) -> None:
     """Write a record as a site: which release of which engine changed what.
 
     RECORD is the folder that dropspin record wrote. The site needs no server and no network. In a folder of the documentation's site, it

@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, Answer, judged, vector_text
-from dropspin.comparisons.diagnosis.loose_body import DIRECTIONS, LooseBody
+from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, OF_FALLS, Answer, judged, vector_text
+from dropspin.comparisons.diagnosis.loose_body import DIRECTIONS, FASTEST, LooseBody
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.scenarios.rotations import unrotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, UP, Array
@@ -17,7 +18,7 @@ SPEED = 10.0  # rad/s
 OBLIQUE = np.array([0.6, 0.48, 0.64])
 """The stated direction of a spin, in the body frame."""
 DIAGONALS = np.array([[0, 1, 1], [1, 0, 1], [1, 1, 0], [0, 1, -1], [1, 0, -1], [1, -1, 0]]) / math.sqrt(2.0)
-FASTEST, SLOWEST = 1e3, 1e-2  # rad/s
+SLOWEST = 1e-2  # rad/s
 LONGEST = 1_000_000
 """Steps of one question at most."""
 
@@ -34,7 +35,7 @@ def fall(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         fallen.append(start[1] - end[1])
         exact.append(facts.fallen(steps * dt))
     free = 0.5 * facts.gravity * (round(FALL / dts[0]) * dts[0]) ** 2
-    answers = [judged(body, "fall", "distance in 1 s", "m", dts, fallen, exact, free)]
+    answers = [judged(body, Answer("fall", "distance in 1 s", "m", physical=free), dts, fallen, exact, OF_FALLS)]
     if any(facts.falls):
         speed = terminal_speed(facts.gravity * (1.0 - facts.lifted), facts.mass, *facts.falls)
         answers.append(Answer("fall", "terminal speed", "m/s", in_force=speed, physical=math.inf))
@@ -46,17 +47,17 @@ def spin(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     facts, answers = body.facts, []
     moments, axes = facts.principal
     for number, axis in enumerate(axes.T):
-        name = f"about {'xyz'[number]}" if np.count_nonzero(axis) == 1 else f"about {vector_text(axis)}"
-        start = facts.start(spin=SPEED * axis)
+        direction, start = vector_text(axis), facts.start(spin=SPEED * axis)
         tau = time_constant(SPEED, moments[number], facts.armature, *facts.spins[number])
         if tau < TURN:
             times = [_decay(body, start, dt, tau) for dt in dts]
-            answers.append(judged(body, "spin", f"1/e time {name}", "s", dts, times, [tau] * len(dts), math.inf))
+            slowed = Answer("spin", "1/e time", "s", direction, physical=math.inf)
+            answers.append(judged(body, slowed, dts, times, [tau] * len(dts)))
         else:
             ends = [_turned(body, start, dt) for dt in dts]
             kept = [float(np.linalg.norm(end[SPIN])) / SPEED for end in ends]
             exact = [facts.spun(number, SPEED, TURN) / SPEED] * len(dts)
-            answers.append(judged(body, "spin", f"fraction kept in 1 s {name}", "1", dts, kept, exact, 1.0))
+            answers.append(judged(body, Answer("spin", "fraction kept in 1 s", "1", direction, physical=1.0), dts, kept, exact))
     return answers
 
 
@@ -88,28 +89,32 @@ def tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     is_slowed = any(time_constant(SPEED, m, facts.armature, *drag) < TURN for m, drag in zip(moments, facts.spins, strict=True))
     if np.ptp(moments) < 1e-9 * moments.max() or is_slowed:
         return []
-    start, free = facts.start(spin=SPEED * OBLIQUE), 0.0
+    start = facts.start(spin=SPEED * OBLIQUE)
     ends = [_turned(body, start, dt) for dt in dts]
     gains = [float(_energy_gain(body, start, end)) for end in ends]
     steps = round(TURN / dts[0])
     after = facts.in_force(start, np.array([0.0, steps * dts[0]]), 0.0)[-1]
     exact = float(_energy_gain(body, start, after))
-    of_stated = judged(body, "tumble", f"energy change in 1 s, {SPEED:g} rad/s", "%", dts, gains, [exact] * len(dts), free)
-    if of_stated.finding == "setting":  # of damping, which no direction and no step is without
+    stated = Answer("tumble", f"energy change in 1 s, {SPEED:g} rad/s", "%", vector_text(OBLIQUE), physical=0.0)
+    of_stated = judged(body, stated, dts, gains, [exact] * len(dts))
+    if any(not finding.is_error for finding in of_stated.findings):  # of damping, which no direction and no step is without
         return [of_stated]
     tried = np.concatenate([DIRECTIONS[DIRECTIONS[:, 1] >= 0.0], DIAGONALS, [OBLIQUE]])
     starts = np.array([facts.start(spin=SPEED * (axes @ direction)) for direction in tried])
     by_direction = _energy_gain(body, starts, _turned(body, starts, dts[0]))
     worst = int(np.argmax(np.abs(by_direction)))
+    axis = axes @ tried[worst]
     turned = 2.0 * math.degrees(math.acos(min(1.0, abs(float(ends[0][ORIENTATION] @ after[ORIENTATION])))))
-    answers = [of_stated, Answer("tumble", "attitude error", "°", turned, in_force=0.0)]
-    answers += [Answer("tumble", f"worst axis {vector_text(tried[worst])}", "%", float(by_direction[worst]))]
-    if abs(by_direction[worst] - exact) > 100.0 * NOTEWORTHY or of_stated.finding:
-        speed = _threshold(lambda w: _gain(body, facts.start(spin=w * (axes @ tried[worst])), dts[0]), SLOWEST, FASTEST)
-        answers.append(Answer("tumble", "spin for 1 %", "rad/s", speed))
-    if of_stated.finding == "time step":
+    answers = [of_stated, Answer("tumble", "attitude error", "°", measured=turned, in_force=0.0)]
+    of_worst = Answer("tumble", "largest energy change", "%", vector_text(axis), measured=float(by_direction[worst]))
+    answers.append(of_worst)
+    if abs(by_direction[worst] - exact) > 100.0 * NOTEWORTHY or of_stated.findings:
+        speed = _threshold(lambda w: _gain(body, facts.start(spin=w * axis), dts[0]), SLOWEST, facts.fastest)
+        detail = "" if facts.fastest == FASTEST else f"none up to {facts.fastest:g}, where the engine clamps it"
+        answers.append(replace(of_worst, quantity="spin for 1 %", unit="rad/s", measured=speed, detail=detail))
+    if any(finding.kind == "time step" for finding in of_stated.findings):
         step = _threshold(lambda dt: _gain(body, start, dt), 1e-2 * dts[0], dts[0])
-        answers.append(Answer("tumble", "dt for 1 %", "s", step))
+        answers.append(replace(stated, quantity="dt for 1 %", unit="s", physical=math.nan, measured=step))
     return answers
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import FRICTIONAL, UNTURNED, WATCHED, Answer, judged
+from dropspin.comparisons.diagnosis.answers import OF_FALLS, TIPS, UNTURNED, WATCHED, Answer, Finding, judged
 from dropspin.comparisons.diagnosis.landing import settled, tilt
 from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
 from dropspin.scenarios.rotations import rotate, unrotate
@@ -21,31 +21,29 @@ ONE_WAY = 0.05
 
 
 def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
-    """The distance in which a body that slides without tipping stops, along and at 45 degrees; and its creep on a slope that holds."""
-    facts = body.facts
+    """The distance in which a body that slides stops, along and at 45 degrees; and its creep on a slope that holds."""
+    facts, causes = body.facts, body.causes.get("slide", ())
     if not facts.lands or not facts.friction > 0.0:
         return []
     free, exact = SLIDE**2 / (2.0 * facts.friction * facts.gravity), _stop(facts)
+    blank = Answer("slide", "stopping distance", "m", speed=SLIDE, physical=free)
     if free > LONGEST_SLIDE:
-        return []
+        return [replace(blank, detail=f"more than {LONGEST_SLIDE:g} m: not simulated")]
     end = settled(body, dts[0])[-1:]
     rests = [body.motions(end, dt, math.ceil(WATCHED / dt), -facts.gravity * UP, floor=True)[0, -1] for dt in dts]
     half = math.sqrt(0.5)
-    found = [_stops(body, dts, rests, direction) for direction in (np.array([1.0, 0.0, 0.0]), np.array([half, 0.0, half]))]
-    if not all(found):
-        return []
-    along, across = found
-    answers = [
-        judged(body, "slide", f"stopping distance from {SLIDE:g} m/s{name}", "m", dts, stops, [exact] * len(dts), free)
-        for name, stops in (("", along), (" at 45°", across))
-    ]
+    along, across = (_stops(body, dts, rests, direction) for direction in (np.array([1.0, 0.0, 0.0]), np.array([half, 0.0, half])))
+    if not along or not across:
+        return [replace(blank, detail=TIPS)]
+    ways = (("0°", along), ("45°", across))
+    answers = [judged(body, replace(blank, direction=way), dts, stops, [exact] * len(dts), OF_FALLS) for way, stops in ways]
     # Soft contacts take some time to carry a load that shifts: a shorter slide says more of that than of friction.
-    is_short = SLIDE / (facts.friction * facts.gravity) < LONG_SLIDE
-    answers = [replace(one, finding="", settings=()) if one.finding in ("time step", "model") and is_short else one for one in answers]
+    if SLIDE / (facts.friction * facts.gravity) < LONG_SLIDE:
+        answers = [replace(one, findings=tuple(found for found in one.findings if not found.is_error)) for one in answers]
     turns = min(abs(second / first - 1.0) for first, second in zip(along, across, strict=True)) > ONE_WAY
-    if turns and not answers[1].finding:
-        answers[1] = replace(answers[1], finding="model")
-    answers = [replace(one, settings=FRICTIONAL) if one.finding in ("time step", "model") else one for one in answers]
+    named = {setting for finding in answers[1].findings for setting in finding.settings}
+    if turns and not named & {*causes, "timestep"}:
+        answers[1] = replace(answers[1], findings=(*answers[1].findings, Finding("model", (*causes, "timestep"))))
     return answers + _creep(body, dts[0])
 
 
@@ -81,12 +79,12 @@ def _creep(body: LooseBody, dt: float) -> list[Answer]:
     start = settled(body, dt)[-1:]
     start[:, VELOCITY] = start[:, SPIN] = 0.0
     states = body.motions(start, dt, math.ceil(1.0 / dt), gravity, floor=True)[0]
+    answer = Answer("slide", "creep on a slope of half of the friction", "m/s", physical=0.0)
     if tilt(states) > UNTURNED:
-        return []
+        return [replace(answer, detail=TIPS)]
     half = len(states) // 2
     moved = float(np.linalg.norm((states[-1] - states[half])[POSITION]))
-    speed = moved / (dt * (len(states) - 1 - half))
-    return [Answer("slide", f"creep on a slope of {math.degrees(slope):.3g}°", "m/s", speed, physical=0.0)]
+    return [replace(answer, measured=moved / (dt * (len(states) - 1 - half)))]
 
 
 def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
@@ -101,10 +99,10 @@ def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         start = end.copy()
         start[VELOCITY], start[SPIN] = [1.0, 0.0, 0.0], [0.0, 0.0, -1.0 / radius]
         kept.append(body.motions(start[np.newaxis], dt, round(1.0 / dt), -facts.gravity * UP, floor=True)[0, -1, VELOCITY][0])
-    name = "fraction kept in 1 s, from 1 m/s"
+    answer = Answer("roll", "fraction kept in 1 s", "1", speed=1.0, physical=1.0)
     if facts.rolling or not facts.friction:
-        return [Answer("roll", name, "1", kept[0], physical=1.0)]
+        return [replace(answer, measured=float(kept[0]))]
     heavy = facts.mass + facts.armature + (inertia + facts.armature) / radius**2
     drag = (facts.falls.linear + facts.spins[0].linear / radius**2, facts.falls.quadratic + facts.spins[0].quadratic / radius**3)
     exact = float(spin_about_axis(1.0, 1.0, heavy, 0.0, *drag))
-    return [judged(body, "roll", name, "1", dts, kept, [exact] * len(dts), 1.0)]
+    return [judged(body, answer, dts, kept, [exact] * len(dts))]

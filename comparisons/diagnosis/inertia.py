@@ -1,16 +1,16 @@
 """The inertia of a body: whether its shape can have it, and that of a solid of uniform density."""
 
+import math
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import Answer, Remedy
+from dropspin.comparisons.diagnosis.answers import Answer, Finding, Remedy, vector_text
 from dropspin.comparisons.diagnosis.loose_body import Facts
 from dropspin.scenarios.bodies.possible_moments import largest_multiple
 from dropspin.scenarios.state import Array
 
+MOMENT = "principal moment"
 ROUNDING = 1.001  # moments are often given with three or four digits
 SMALL = 1e-3
 """Share of the largest moment below which products of inertia are left out."""
@@ -18,28 +18,31 @@ SMALL = 1e-3
 
 def inertia(facts: Facts) -> list[Answer]:
     """The moments in force beside those of a solid; what is impossible in those of the file, or of the engine if the file has none."""
-    solid, answers = facts.solid, list(_impossible(facts, facts.inertia if facts.written is None else facts.written))
-    if solid is not None:
-        text = f"the inertia of a uniform solid, {_components(solid)}"
-        answers = [replace(answer, remedies=(Remedy(text),)) for answer in answers]
+    solid = facts.solid
+    remedies = () if solid is None else (Remedy(f"the inertia of a uniform solid, {_components(solid)}"),)
+    answers = list(_impossible(facts, facts.inertia if facts.written is None else facts.written, remedies))
     for number, axis in enumerate(facts.principal[1].T):
-        of_solid = np.nan if solid is None else float(axis @ solid @ axis)
-        answers.append(Answer("inertia", f"principal moment {number + 1}", "kg m²", facts.principal[0][number], physical=of_solid))
+        of_solid = math.nan if solid is None else float(axis @ solid @ axis)
+        moment = float(facts.principal[0][number])
+        answers.append(Answer("inertia", MOMENT, "kg m²", vector_text(axis), measured=moment, physical=of_solid))
     return answers
 
 
-def _impossible(facts: Facts, given: Array) -> Iterator[Answer]:
+def _impossible(facts: Facts, given: Array, remedies: tuple[Remedy, ...]) -> Iterator[Answer]:
     """Why no body has an inertia [kg m²], shape (3, 3), or no body of this shape and mass."""
     least, middle, largest = np.linalg.eigvalsh(given).tolist()
-    common: dict[str, Any] = {"unit": "1", "physical": 1.0, "finding": "impossible", "settings": ("inertia",)}
-    if least <= 0.0 or largest > ROUNDING * (least + middle):
-        yield Answer("inertia", "largest moment / sum of others", measured=largest / (least + middle), detail="any body", **common)
-    elif facts.parts:
+    excess, quantity, whose = largest / (least + middle), "largest moment / sum of others", "any body"
+    if least > 0.0 and largest <= ROUNDING * (least + middle):
+        if not facts.parts:
+            return
         squares = (0.5 * np.trace(given) * np.eye(3) - given) / facts.mass
         excess = 1.0 / largest_multiple(facts.points, squares, 1.0 / ROUNDING)
-        if excess > ROUNDING:
-            excess = factor if (factor := largest / largest_possible(facts, given)) > ROUNDING else excess
-            yield Answer("inertia", "largest moment / largest possible", measured=excess, detail="this mass and shape", **common)
+        if excess <= ROUNDING:
+            return
+        excess = factor if (factor := largest / largest_possible(facts, given)) > ROUNDING else excess
+        quantity, whose = "largest moment / largest possible", "this mass and shape"
+    finding = Finding("impossible", ("inertia",), remedies, whose)
+    yield Answer("inertia", quantity, "1", measured=excess, physical=1.0, findings=(finding,))
 
 
 def _components(tensor: Array) -> str:

@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from itertools import product
+from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, SETTLED, UNTURNED, WATCHED, Answer, Finding
+from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, REBOUND, SETTLED, TIPS, UNTURNED, WATCHED, Answer, Finding
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.judging.error_budget import error_budget, is_sufficient
 from dropspin.scenarios.rotations import rotate, unrotate
@@ -20,55 +20,39 @@ LEAST_NOISE = 1e-6  # of a ratio of speeds
 
 def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The rebound above the surface in the file's pose, over speeds and start phases; the depth and the time in contact at 1 m/s."""
-    facts, answers = body.facts, []
-    if not facts.lands:
+    if not body.facts.lands:
         return []
-    at_1: list[Answer] = []
-    bodies = {"": body}
+    answers = [rebound(body, dts, speed, REBOUND) for speed in IMPACTS]
     if "restitution" in body.remedies:
-        bodies["surface with restitution 1, "] = body.changed(body.remedies["restitution"][0])
-    for (name, one), speed in product(bodies.items(), IMPACTS):
-        found = [_rebounds(one, speed, dt, FEWER if number else PHASES) for number, dt in enumerate(dts)]
-        ratios, upward, depths, times = zip(*found, strict=True)
-        means = [float(np.mean(ratio)) for ratio in ratios]
+        lively = body.tried(("restitution",))
+        answers += [rebound(lively, dts, speed, f"{REBOUND} on a surface with restitution 1") for speed in IMPACTS]
+    _, upward, depths, times = _rebounds(body, 1.0, dts[0], PHASES)
+    longest = float(np.max(times))
+    detail = f"> {WATCHED:g} s" if math.isinf(longest) else ""
+    of_upward = Answer("impact", "largest upward / impact speed", "1", speed=1.0, measured=float(np.mean(upward)))
+    answers.append(replace(of_upward, least=float(min(upward)), most=float(max(upward))))
+    answers.append(Answer("impact", "penetration", "m", speed=1.0, measured=float(np.max(depths))))
+    answers.append(Answer("impact", "contact", "s", speed=1.0, measured=longest, detail=detail))
+    return answers
+
+
+def rebound(body: LooseBody, dts: Sequence[float], speed: float, quantity: str) -> Answer:
+    """The rebound over the speed of an impact [m/s], the mean over start phases: a finding if time step, phase or engine change it."""
+    ratios = [_rebounds(body, speed, dt, FEWER if number else PHASES)[0] for number, dt in enumerate(dts)]
+    means = [float(np.mean(ratio)) for ratio in ratios]
+    limit = 0.0 if max(means) == 0.0 else math.nan
+    if is_sufficient(dts) and max(means) > 0.0:
         noise = [max(float(np.ptp(ratio)) / math.sqrt(12.0) / len(ratio), LEAST_NOISE) for ratio in ratios]
-        limit = 0.0 if max(means) == 0.0 else math.nan
-        if is_sufficient(dts) and max(means) > 0.0:
-            budget = error_budget(dts, means, resolution=noise, signed=False, negligible=0.1 * NOTEWORTHY)
-            limit = math.nan if budget.cause == "unresolved" else budget.asymptotic_error
-        quantity = f"{name}rebound / impact speed at {speed:g} m/s"
-        exact = math.nan if one.facts.restitution is None else one.facts.restitution
-        change = abs(means[0] - (means[-1] if math.isnan(exact) else exact))
-        finding: Finding = "time step" if max(change, float(np.ptp(ratios[0]))) > NOTEWORTHY else ""
-        settings = ("timestep",) if finding else ()
-        if finding and not math.isnan(exact):
-            settings = ("contactERP", *settings)
-            if abs(means[-1] - exact) >= 0.6 * change:
-                finding = "model"
-        least, most = float(min(ratios[0])), float(max(ratios[0]))
-        answers.append(
-            Answer(
-                "impact",
-                quantity,
-                "1",
-                means[0],
-                exact,
-                limit=limit,
-                finding=finding,
-                least=least,
-                most=most,
-                settings=settings,
-            )
-        )
-        if speed == 1.0 and one is body:
-            longest = float(np.max(times[0]))
-            detail = f"> {WATCHED:g} s" if math.isinf(longest) else ""
-            ratio = float(np.mean(upward[0]))
-            ends = float(min(upward[0])), float(max(upward[0]))
-            at_1 = [Answer("impact", "largest upward / impact speed at 1 m/s", "1", ratio, least=ends[0], most=ends[1])]
-            at_1 += [Answer("impact", "penetration at 1 m/s", "m", float(np.max(depths[0])))]
-            at_1.append(Answer("impact", "contact at 1 m/s", "s", longest, detail=detail))
-    return answers + at_1
+        budget = error_budget(dts, means, resolution=noise, signed=False, negligible=0.1 * NOTEWORTHY)
+        limit = math.nan if budget.cause == "unresolved" else budget.asymptotic_error
+    exact = math.nan if body.facts.restitution is None else body.facts.restitution
+    change = abs(means[0] - (means[-1] if math.isnan(exact) else exact))
+    findings: tuple[Finding, ...] = ()
+    if max(change, float(np.ptp(ratios[0]))) > NOTEWORTHY:
+        stays = not math.isnan(exact) and abs(means[-1] - exact) >= 0.6 * change
+        findings = (Finding("model" if stays else "time step", (*body.causes.get("impact", ()), "timestep")),)
+    answer = Answer("impact", quantity, "1", speed=speed, measured=means[0], in_force=exact, limit=limit, findings=findings)
+    return replace(answer, least=float(min(ratios[0])), most=float(max(ratios[0])))
 
 
 def _rebounds(body: LooseBody, speed: float, dt: float, phases: int) -> tuple[Array, Array, Array, Array]:
@@ -117,12 +101,12 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     depth = -float(heights.mean())
     size = max(float(np.linalg.norm(facts.points, axis=1).max()), 1e-12)
     floats = facts.margin > 0.0 and -depth > NOTEWORTHY * size
-    finding: Finding = "setting" if floats else ""
+    findings = (Finding("setting", ("margin",)),) * floats
     speed = float(np.linalg.norm(np.ptp(last[:, POSITION], axis=0))) / 0.5
-    tipped = tilt(states) > UNTURNED
+    detail = TIPS if tilt(states) > UNTURNED else ""
     return [
-        Answer("rest", "penetration", "m", depth, facts.rest_depth, 0.0, finding=finding, settings=("margin",) * floats),
-        Answer("rest", "drift speed", "m/s", speed, physical=0.0, detail="tips over" if tipped else ""),
+        Answer("rest", "penetration", "m", measured=depth, in_force=facts.rest_depth, physical=0.0, findings=findings),
+        Answer("rest", "drift speed", "m/s", measured=speed, physical=0.0, detail=detail),
     ]
 
 

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from dropspin.scenarios.rotations import rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, Array
 from dropspin.scenarios.truths.settings import Resistance, fall, free_motion, spin_about_axis
 
+FASTEST = 1e3  # rad/s
 AXES = np.eye(3)
 STILL = np.zeros(3)
 ROUNDING = 1e-14  # of products of inertia, relative to the moments
@@ -60,7 +61,8 @@ class Facts:
 
     Attributes:
         name: The body's name in the file, or its number.
-        engine: The engine and its version.
+        engine: The engine.
+        version: Its version.
         dt: The time step of the file, or the engine's default [s].
         gravity: Magnitude of the acceleration of gravity [m/s²].
         mass: [kg].
@@ -75,6 +77,7 @@ class Facts:
         lifted: The share of the weight that the settings take away.
         unknown: The names of the settings by which forces act that no exact solution here includes.
         surface: The name of what it lands on; empty for nothing.
+        others: The names of what else it may land on.
         friction: The coefficient of friction of both together.
         restitution: The coefficient of restitution of both together; None if the engine has none.
         margin: Height above the surface from which the contact acts [m].
@@ -84,10 +87,12 @@ class Facts:
         settings: Where settings that matter are written, by the engine's names.
         ignored: What the engine read and does not use, or changes: name, what is written, what is in force.
         unmodelled: What the file has beside the body that the simulations leave out.
+        fastest: The largest spin that the engine simulates, or that is tried [rad/s].
     """
 
     name: str
     engine: str
+    version: str
     dt: float
     gravity: float
     mass: float
@@ -102,6 +107,7 @@ class Facts:
     lifted: float
     unknown: Sequence[str]
     surface: str
+    others: Sequence[str]
     friction: float
     restitution: float | None
     margin: float
@@ -111,6 +117,7 @@ class Facts:
     settings: Mapping[str, Setting]
     ignored: Sequence[tuple[str, Setting, str]]
     unmodelled: Sequence[str]
+    fastest: float = FASTEST
 
     def lowest(self, states: Array) -> Array:
         """Heights of the body's lowest point at states, shape (n,) [m]."""
@@ -227,17 +234,42 @@ class LooseBody(ABC):
 
     Attributes:
         facts: What is in force.
-        remedies: By the name of a setting, the changes that take its effect away, and the text to paste.
-        time_step: The text to paste for a time step [s].
+        remedies: By the name of a setting, the changes that take its effect away.
+        causes: By question, the settings that may change errors, beside the time step.
     """
 
     facts: Facts
-    remedies: Mapping[str, tuple[Changes, str]]
-    time_step = '<option timestep="{:g}"/>'
+    remedies: Mapping[str, Changes]
+    causes: ClassVar[Mapping[str, tuple[str, ...]]]
 
     @abstractmethod
     def changed(self, changes: Changes) -> "LooseBody":
         """The body with other settings."""
+
+    def tried(self, settings: Sequence[str]) -> "LooseBody":
+        """The body with the remedies of some settings, made once."""
+        key = tuple(settings)
+        if not key:
+            return self
+        if key not in self._tried:
+            self._tried[key] = self.changed(self.changes(settings))
+        return self._tried[key]
+
+    def changes(self, settings: Sequence[str]) -> Changes:
+        """The changes of the remedies of some settings."""
+        return {name: value for setting in settings for name, value in self.remedies[setting].items()}
+
+    @cached_property
+    def _tried(self) -> dict[tuple[str, ...], "LooseBody"]:
+        return {}
+
+    @abstractmethod
+    def patch(self, changes: Changes, dt: float) -> str:
+        """What to write for changes and a time step [s], in the words of the file, and where."""
+
+    @abstractmethod
+    def for_restitution(self, restitution: float, dt: float) -> Changes:
+        """The changes that give a coefficient of restitution at a time step [s], those of `dropspin calibrate`."""
 
     def elsewhere(self, dt: float, changes: Changes) -> tuple[int, bool]:
         """The number of other bodies that changes apply to as well, and whether the whole model runs with them."""

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -14,15 +15,22 @@ from dropspin.comparisons.diagnosis.source import read_source
 from dropspin.comparisons.engines.mujoco_simulation import quiet
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.truths.soft_rest import GeomSettings, mixed
 
 BODY, GEOM = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_GEOM
 PLANE, BOX = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX
+EQUALITIES = "equality constraints"
 SURFACES = (PLANE, BOX)
 """The kinds of geometries that a body may land on."""
-RK4, ELLIPTIC = int(mujoco.mjtIntegrator.mjINT_RK4), int(mujoco.mjtCone.mjCONE_ELLIPTIC)
+ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
+ENUMERATIONS = {"RK4": int(mujoco.mjtIntegrator.mjINT_RK4), "elliptic": ELLIPTIC}
+"""Values of options in the words of MJCF."""
+UNMODELLED = {"nflex": "flexible bodies", "flg_surfacevel": "surface velocities", "flg_adhesion": "adhesion of geometries"}
 OPTIONS = [name for name in dir(mujoco.MjSpec().option) if not name.startswith("_")]
-MOST_NAMES = 20
+MOST_NAMES, MOST_KEYS = 20, 3
+TURNED = 1e-6
+"""Difference of |cos(angle / 2)| from 1 up to which two orientations are the same."""
 ADDED = "a plane with default settings"
 """The surface of a file that has none."""
 
@@ -93,7 +101,7 @@ class MuJoCoFile:
         if not found:
             if not heavy:
                 raise DropspinError(f"{self.given}: no body moves and has mass; give a body a free joint and a mass.")
-            there = f"{', '.join(heavy[:MOST_NAMES])}{' and others' * (len(heavy) > MOST_NAMES)} move on joints"
+            there = f"{', '.join(heavy[:MOST_NAMES])}{' and others' * (len(heavy) > MOST_NAMES)} move on joints or are tied"
             raise DropspinError(f"{self.given}: no body is free: {there}; name one with --body, or give --loose for all.")
         return list(found)
 
@@ -113,27 +121,57 @@ class MuJoCoFile:
         return [body for body in range(1, self.model.nbody) if welded[body] == welded[head] and body >= head]
 
     def is_free(self, body: int) -> bool:
-        """Whether a body has a free joint, and nothing is jointed to it."""
+        """Whether a body has a free joint, and nothing is jointed or tied to it."""
         model = self.model
         has_joint = model.body_jntnum[body] == 1 and model.jnt_type[model.body_jntadr[body]] == mujoco.mjtJoint.mjJNT_FREE
-        return bool(has_joint and np.sum(model.body_rootid == body) == len(self.group(body)))
+        is_alone = np.sum(model.body_rootid == body) == len(self.group(body))
+        return bool(has_joint and is_alone and EQUALITIES not in self.unmodelled(body))
+
+    @cached_property
+    def _coupled(self) -> dict[str, Array]:
+        """The degrees of freedom that equality constraints, tendons and actuators act on: the columns of their Jacobians."""
+        model = copy(self.model)
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
+        data = mujoco.MjData(model)
+        with quiet():
+            mujoco.mj_forward(model, data)
+        tying = data.efc_J_colind[: data.efc_J_rownnz[: data.ne].sum()]
+        return {EQUALITIES: tying, "tendons": model.ten_J_colind, "actuators": data.moment_colind}
+
+    def unmodelled(self, body: int) -> list[str]:
+        """What acts on a body in the model, and not on the body alone; and the keyframes in which it is turned."""
+        model, joint = self.model, self.model.body_jntadr[body]
+        dofs = np.flatnonzero(np.isin(model.dof_bodyid, self.group(body)))
+        found = [words for words, columns in self._coupled.items() if np.isin(columns, dofs).any()]
+        found += [words for field, words in UNMODELLED.items() if getattr(model, field, 0)]
+        if joint >= 0 and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
+            turn = model.jnt_qposadr[joint] + np.arange(3, 7)
+            turned = np.abs(model.key_qpos[:, turn] @ model.qpos0[turn]) < 1.0 - TURNED
+            names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_KEY, int(key)) or str(key) for key in np.flatnonzero(turned)]
+            found += [f"the pose of keyframe {', '.join(names[:MOST_KEYS])}{' and others' * (len(names) > MOST_KEYS)}"] * bool(names)
+        return found
+
+    def surfaces(self, own: Sequence[int]) -> list[int]:
+        """The planes, then the boxes, of the world that some geometries collide with, and if there is none, a plane that is added."""
+        model, geoms = self.model, self.names(GEOM, self.model.ngeom)
+        still = [geom for geom in geoms.values() if model.body_weldid[model.geom_bodyid[geom]] == 0 and geom not in own]
+        ranked = [geom for kind in SURFACES for geom in still if model.geom_type[geom] == kind and geom != geoms[ADDED]]
+        found = [geom for geom in ranked if any(self.contact(one, geom) for one in own)]
+        return found or [geoms[ADDED]] * any(self.contact(one, geoms[ADDED]) for one in own)
 
     def surface(self, wanted: str | None, own: Sequence[int]) -> int | None:
-        """The geometry that some geometries land on: the one named, or the first plane or else box of the world that they collide with.
+        """The geometry that some geometries land on: the one named, or the first one.
 
         Raises:
             DropspinError: There is no such geometry, or it is neither a plane nor a box.
         """
-        model = self.model
-        others = {name: geom for name, geom in self.names(GEOM, model.ngeom).items() if geom not in own}
-        if wanted is not None:
-            verify_known("the model's geometry", [wanted], others)
-            if int(model.geom_type[others[wanted]]) not in map(int, SURFACES):
-                raise DropspinError(f"--on {wanted}: is neither a plane nor a box; name one of these.")
-            return others[wanted]
-        still = [geom for geom in others.values() if model.body_weldid[model.geom_bodyid[geom]] == 0]
-        ranked = [geom for kind in SURFACES for geom in still if model.geom_type[geom] == kind and geom != others[ADDED]]
-        return next((geom for geom in [*ranked, others[ADDED]] if any(self.contact(one, geom) for one in own)), None)
+        if wanted is None:
+            return next(iter(self.surfaces(own)), None)
+        others = {name: geom for name, geom in self.names(GEOM, self.model.ngeom).items() if geom not in own}
+        verify_known("the model's geometry", [wanted], others)
+        if int(self.model.geom_type[others[wanted]]) not in map(int, SURFACES):
+            raise DropspinError(f"--on {wanted}: is neither a plane nor a box; name one of these.")
+        return others[wanted]
 
     def contact(self, first: int, second: int) -> dict[str, Any] | None:
         """The settings of a contact of two geometries, as MuJoCo mixes them; None if they do not collide."""
@@ -170,7 +208,8 @@ def plain(value: Any) -> Any:
 def set_options(option: Any, compiled: Any, dt: float, changes: Changes) -> None:
     """Give a specification the options of a compiled model, but for the time step [s] and changes; without the automatic reset."""
     for name in OPTIONS:
-        setattr(option, name, changes.get(name, getattr(compiled, name)))
+        value = changes.get(name, getattr(compiled, name))
+        setattr(option, name, ENUMERATIONS[value] if isinstance(value, str) else value)
     option.timestep = dt
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
 

@@ -1,16 +1,19 @@
 """A body of an MJCF or URDF file in the file's own words: its settings with their lines, and what MuJoCo changes or does not use."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 
 import mujoco
 import numpy as np
 
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile
-from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting
+from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
 
+OF_JOINT = ("damping", "armature", "frictionloss")
+MOST_URGENT = 9
+"""A priority of which a geometry's contact settings count alone."""
 SAME = 1e-6
 """Relative difference up to which a moment of inertia is the one that was written."""
 IN_FORCE = {"lateral_friction": 1.0, "rolling_friction": 0.0, "spinning_friction": 0.0, "restitution": 0.0}
@@ -67,15 +70,10 @@ class BodyText:
         found = {name: option_setting(root, "option", name, default) for name, default in options.items()}
         if body is None:
             return found
-        joint = next((child for child in body.children if child.tag in ("joint", "freejoint")), None)
-        own = [child for child in body.children if child.tag == "geom"]
-        name = "" if self._surface is None else mujoco.mj_id2name(self._file.model, GEOM, self._surface)
-        there = [geom for geom in root.every("geom") if geom.attributes.get("name") == name and geom not in own] if name else []
-        there = there or [geom for geom in root.every("geom") if geom not in own]
-        places: dict[str, list[Element | None]] = {"gravcomp": [body], "damping": [joint], "armature": [joint], "frictionloss": [joint]}
-        places |= {name: [*own, *there[:1]] for name in ("margin", "solref", "solimp", "friction", "condim")}
+        places: dict[str, list[Element]] = {"gravcomp": [body]} | dict.fromkeys(OF_JOINT, self._joint)
+        places |= dict.fromkeys(("margin", "solref", "solimp", "friction", "condim"), self._geoms)
         inertial = next(body.every("inertial"), None)
-        written = {name: [mjcf_setting(one, name) for one in elements if one is not None] for name, elements in places.items()}
+        written = {name: [mjcf_setting(one, name) for one in elements] for name, elements in places.items()}
         if inertial is not None:
             tensor = next(inertial.every("inertia"), None)  # of URDF
             names = ("diaginertia", "fullinertia", "mass")
@@ -84,6 +82,49 @@ class BodyText:
             first = next((setting for setting in settings if setting is not None), None)
             found |= {} if first is None else {name: first}
         return found
+
+    @cached_property
+    def _joint(self) -> list[Element]:
+        """The joint of the body."""
+        return [] if self.element is None else [child for child in self.element.children if child.tag in ("joint", "freejoint")][:1]
+
+    @cached_property
+    def _geoms(self) -> list[Element]:
+        """The geometries of the body, and the one that it lands on, by its name or, in the world, by its place."""
+        own = [] if self.element is None else [child for child in self.element.children if child.tag == "geom"]
+        others, model, surface = [geom for geom in self._file.source.every("geom") if geom not in own], self._file.model, self._surface
+        if surface is None:
+            return own
+        name = mujoco.mj_id2name(model, GEOM, surface)
+        named = [geom for geom in others if name and geom.attributes.get("name") == name]
+        of_world = [geom for geom in others if geom.parent is not None and geom.parent.tag == "worldbody"]
+        if len(of_world) == model.body_geomnum[0] - 1:  # without the plane that is added
+            named = named or of_world[surface : surface + 1]
+        return [*own, *named]
+
+    def patch(self, options: Mapping[str, object], others: Mapping[str, object]) -> str:
+        """Elements to write for changes of options, and of the joint, the geometries and the body: changed ones with their lines.
+
+        Args:
+            options: New values of options of the model.
+            others: New values of other settings.
+        """
+        found: list[Setting | str] = []
+        if options:
+            element = next(reversed(list(self._file.source.every("option"))), None)
+            bare = "<mujoco>{}</mujoco>" if self._file.is_urdf else "{}"
+            found.append(element.changed(options) if element else bare.format(f"{tagged('option', options)}/>"))
+        if "damping" in others:
+            found += [Setting("<freejoint/>", joint.file, joint.line) for joint in self._joint] or ["<freejoint/>"]
+        elif of_joint := {name: value for name, value in others.items() if name in OF_JOINT}:
+            found += [joint.changed(of_joint) for joint in self._joint]
+        if "gravcomp" in others and self.element is not None:
+            found.append(self.element.changed({"gravcomp": others["gravcomp"]}))
+        if "margin" in others:
+            found += [geom.changed({"margin": 0}) for geom in self._geoms if mjcf_setting(geom, "margin") is not None]
+        if contact := {name: value for name, value in others.items() if name in ("solref", "solimp")}:
+            found += [geom.changed(contact | {"priority": MOST_URGENT}) for geom in self._geoms[:1]]
+        return ", ".join(map(str, found)) or " ".join(f'{name}="{value}"' for name, value in others.items())
 
     def ignored(self, inertia: Array, *, raised: bool) -> Iterator[tuple[str, Setting, str]]:
         """What the file says and MuJoCo changes or does not use.

@@ -6,9 +6,10 @@ the inertial frame whose pose PyBullet reports.
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pybullet_data  # type: ignore[import-untyped]
@@ -41,6 +42,16 @@ DEFAULTS = {
     "margin": f"a margin of {MARGIN:g} m around convex hulls",
     "friction": "lateralFriction=0.5",
 }
+CALLS = {
+    "damping": "changeDynamics(body, -1, linearDamping=0, angularDamping=0)",
+    "inertia": "loadURDF(..., flags=URDF_USE_INERTIA_FROM_FILE)",
+    "contactERP": "setPhysicsEngineParameter(contactERP={:g})",
+    "restitution": "changeDynamics(plane, -1, restitution={:g})",
+    "own restitution": "changeDynamics(body, -1, restitution={:g})",
+}
+"""What to call for changes of settings."""
+FASTEST = 100.0
+"""Bullet's maxJointVelocity, to which it clamps the components of velocity and spin [m/s, rad/s]."""
 WRITTEN = (
     ("lateral_friction", "value", "friction"),
     ("restitution", "value", "restitution"),
@@ -72,13 +83,13 @@ class PyBulletBody(LooseBody):
     Args:
         model: The file.
         name: The link's name.
-        changes: Settings that differ from PyBullet's: `damping`, `inertia`, `contactERP`, and `restitution`, that of the surface.
+        changes: Settings that differ from PyBullet's, those of `CALLS`; `restitution` is that of the surface.
 
     Raises:
         DropspinError: PyBullet gives the body no mass or no inertia.
     """
 
-    time_step = "setTimeStep({:g})"
+    causes: ClassVar[Mapping[str, tuple[str, ...]]] = {"impact": ("contactERP",)}
 
     def __init__(self, model: PyBulletModel, name: str, changes: Changes) -> None:
         self._model, self._name, self._changes = model, name, changes
@@ -97,16 +108,19 @@ class PyBulletBody(LooseBody):
         centre = np.average(centres, axis=0, weights=self._masses)
         self._arms, self._arm = centres - centre, unrotate(first.turn, centre - first.position)
         self.facts = self._facts(centre, own)
-        self.remedies = {
-            "damping": ({"damping": 0.0}, "changeDynamics(body, -1, linearDamping=0, angularDamping=0)"),
-            "inertia": ({"inertia": "file"}, "loadURDF(..., flags=URDF_USE_INERTIA_FROM_FILE)"),
-            "contactERP": ({"contactERP": 0.0}, "setPhysicsEngineParameter(contactERP=0)"),
-        }
+        self.remedies = {"damping": {"damping": 0.0}, "inertia": {"inertia": "file"}, "contactERP": {"contactERP": 0.0}}
         if first.restitution > 0.0:
-            self.remedies["restitution"] = ({"restitution": 1.0}, "changeDynamics(plane, -1, restitution=1)")
+            self.remedies["restitution"] = {"restitution": 1.0}
 
     def changed(self, changes: Changes) -> LooseBody:
         return PyBulletBody(self._model, self._name, {**self._changes, **changes})
+
+    def patch(self, changes: Changes, dt: float) -> str:
+        calls = [CALLS[name].format(value) for name, value in changes.items()]
+        return ", ".join([*calls, *([f"setTimeStep({dt:g})"] if dt != STEP else [])])
+
+    def for_restitution(self, restitution: float, dt: float) -> Changes:
+        return {"own restitution": restitution, "restitution": 1.0, "contactERP": 0.0}
 
     def motions(self, starts: Array, dt: float, steps: int, gravity: Array, *, floor: bool) -> Array:
         body, _ = self._world(floor)
@@ -147,6 +161,9 @@ class PyBulletBody(LooseBody):
             plane = bullet.loadURDF(PLANE, baseOrientation=Z_TO_Y.tolist()) if floor else -1
             if floor and "restitution" in changes:
                 bullet.changeDynamics(plane, -1, restitution=changes["restitution"])
+            if "own restitution" in changes:
+                for link in range(-1, bullet.getNumJoints(body)):
+                    bullet.changeDynamics(body, link, restitution=changes["own restitution"])
             bullet.holds, bullet.numbers = (self, floor), (body, plane)
         return bullet.numbers
 
@@ -160,7 +177,8 @@ class PyBulletBody(LooseBody):
         margin = MARGIN if parts and _bottom(parts).shape.shape == "mesh" else 0.0
         facts = Facts(
             name=self._name,
-            engine=f"PyBullet {version('pybullet')}",
+            engine="PyBullet",
+            version=version("pybullet"),
             dt=STEP,
             gravity=GRAVITY,
             mass=mass,
@@ -175,6 +193,7 @@ class PyBulletBody(LooseBody):
             lifted=0.0,
             unknown=(),
             surface=SURFACE if parts else "",
+            others=(),
             friction=touching.dynamics[1] * plane[1],
             restitution=touching.restitution * plane[5],
             margin=margin,
@@ -184,8 +203,9 @@ class PyBulletBody(LooseBody):
             settings=self._settings(),
             ignored=self._ignored(plane[5]),
             unmodelled=["joints"] if len(self._model.heads) > 1 else [],
+            fastest=FASTEST,
         )
-        if not parts or any(answer.finding for answer in inertia(facts)):
+        if not parts or any(answer.findings for answer in inertia(facts)):
             parts = [*parts, *(part for link in self._links for part in link.visual_parts(self._model, centre))]
         x, y, z = (self._drag(axis, own, kappa) for axis in facts.principal[1].T)
         return replace(facts, spins=(x, y, z), parts=parts)

@@ -1,10 +1,11 @@
 """The text of a model file, MJCF or URDF: its elements with their lines, those of included files too, and where a setting was written."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
 
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.files import read_file
@@ -70,8 +71,16 @@ class Element:
     @property
     def words(self) -> Setting:
         """The element with all its attributes."""
-        values = "".join(f' {name}="{text}"' for name, text in self.attributes.items())
-        return Setting(f"<{self.tag}{values}>", self.file, self.line)
+        return Setting(f"{tagged(self.tag, self.attributes)}>", self.file, self.line)
+
+    def changed(self, attributes: Mapping[str, object]) -> Setting:
+        """The element with other attributes, to paste in its place."""
+        return Setting(f"{tagged(self.tag, {**self.attributes, **attributes})}{'>' if self.children else '/>'}", self.file, self.line)
+
+
+def tagged(tag: str, attributes: Mapping[str, object]) -> str:
+    """An element of XML without its end."""
+    return f"<{tag}{''.join(f' {name}={quoteattr(str(value))}' for name, value in attributes.items())}"
 
 
 def read_source(path: Path) -> Element:

@@ -2,21 +2,20 @@
 
 import math
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, Answer, Finding, Remedy
+from dropspin.comparisons.diagnosis.answers import COEFFICIENT, Answer, Finding
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble
 from dropspin.comparisons.diagnosis.friction import roll, slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
+from dropspin.comparisons.diagnosis.remedies import Question, Targets, answers_to
 from dropspin.comparisons.diagnosis.source import Setting
-from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.running.entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
@@ -30,12 +29,7 @@ READERS = {".xml": ("mujoco",), ".mjcf": ("mujoco",), ".urdf": ("mujoco", "pybul
 """The engines that read a file, by its ending."""
 MESH = """<mujoco><asset><mesh name="mesh" file="{path}"/></asset><worldbody><geom type="plane" size="0 0 1"/>
 <body name="{name}"><freejoint/><geom type="mesh" mesh="mesh" density="{density:g}"/></body></worldbody></mujoco>"""
-HALVINGS = (1.0, 0.5, 0.25)
-SAFE = 0.85
-"""Factor on the time step at which an error of first order would be as large as a finding."""
 Found = TypeVar("Found")
-Question = Callable[[LooseBody, Sequence[float]], list[Answer]]
-"""A function of a body and of time steps, of which the first is judged."""
 QUESTIONS: tuple[Question, ...] = (fall, spin, tumble, impact, rest, slide, roll)
 
 
@@ -55,11 +49,13 @@ class BodyDiagnosis:
 
     Attributes:
         name: The body's name.
-        engine: The engine and its version.
+        engine: The engine.
+        version: Its version.
         dt: The time step of the file, or the engine's default [s].
         mass: [kg].
         shapes: Its shapes.
         surface: What it lands on; empty for nothing.
+        others: What else it may land on, unless what it lands on was named.
         friction: The coefficient of friction of both together.
         answers: The answers to all questions, findings included.
         settings: Where the settings are written, by name.
@@ -69,10 +65,12 @@ class BodyDiagnosis:
 
     name: str
     engine: str
+    version: str = ""
     dt: float = math.nan
     mass: float = math.nan
     shapes: tuple[str, ...] = ()
     surface: str = ""
+    others: tuple[str, ...] = ()
     friction: float = math.nan
     answers: tuple[Answer, ...] = ()
     settings: dict[str, Setting] | None = None
@@ -80,25 +78,9 @@ class BodyDiagnosis:
     breakdown: str = ""
 
     @property
-    def findings(self) -> list[Answer]:
-        """The answers that are findings."""
-        return [answer for answer in self.answers if answer.finding]
-
-
-@dataclass(frozen=True)
-class Targets:
-    """What the user wants of a body: a coefficient of restitution and of friction; None for no target."""
-
-    restitution: float | None = None
-    friction: float | None = None
-
-    def judge(self, answer: Answer) -> Answer:
-        """An answer that misses its target as a finding."""
-        wanted = {"impact": self.restitution, "friction": self.friction}.get(answer.question)
-        is_judged = answer.question == "friction" or answer.quantity.startswith("rebound / impact speed")
-        if wanted is None or not is_judged or abs(answer.measured - wanted) <= NOTEWORTHY:
-            return answer
-        return replace(answer, finding="target", detail=f"the target is {wanted:g}")
+    def findings(self) -> list[tuple[Answer, Finding]]:
+        """Each finding, with the answer that has it."""
+        return [(answer, finding) for answer in self.answers for finding in answer.findings]
 
 
 @dataclass(frozen=True)
@@ -116,7 +98,7 @@ class Diagnosis:
     @property
     def failed(self) -> bool:
         """Whether something is impossible, or a target is missed."""
-        return any(answer.finding in ("impossible", "target") for body in self.bodies for answer in body.answers)
+        return any(finding.kind in ("impossible", "target") for body in self.bodies for _, finding in body.findings)
 
 
 def diagnose(
@@ -127,7 +109,8 @@ def diagnose(
     on: str | None = None,
     loose: bool = False,
     density: float = 1000.0,
-    targets: Targets = Targets(),
+    restitution: float | None = None,
+    friction: float | None = None,
     resources: ResourceLimits = RESOURCES,
     jobs: int | None = None,
     on_progress: Callable[[str, float], None] | None = None,
@@ -141,7 +124,8 @@ def diagnose(
         on: The name of the geometry that they land on; by default the first plane or box that they collide with.
         loose: Whether to cut links loose that move on joints.
         density: Density of a mesh [kg/m³].
-        targets: The restitution and the friction that are wanted.
+        restitution: Target for the coefficient of restitution.
+        friction: Target for the coefficient of friction.
         resources: The processor time [s] and memory [bytes] that one body may use.
         jobs: Number of bodies to diagnose at a time; by default, the number of processors.
         on_progress: Called with what is being done and the share of the bodies that are done.
@@ -165,22 +149,24 @@ def diagnose(
             path = _around_mesh(path, given, density, Path(folder))
         entries = [present_entry(engine) for engine in chosen]
         with started_crews(1, 1, entries, resources) as crews:
-            pieces = [(entry, name) for entry in entries for name in _checked(crews[0].call(entry, _bodies, path, given, wanted, loose))]
+            pieces = [
+                (entry, name) for entry in entries for name in _checked(given, crews[0].call(entry, _bodies, path, given, wanted, loose))
+            ]
         with started_crews(jobs, len(pieces), entries, resources) as crews:
 
             def of_body(piece: tuple[EngineEntry, str], processes: EngineProcesses, report: Callable[[str], None]) -> BodyDiagnosis:
                 entry, name = piece
                 report(f"{name} with {entry.label}")
-                found = processes.call(entry, _diagnosed, path, given, name, on, targets)
-                return BodyDiagnosis(name, entry.label, breakdown=found.reason) if isinstance(found, Breakdown) else _checked(found)
+                found = processes.call(entry, _diagnosed, path, given, name, on, Targets(restitution, friction))
+                return BodyDiagnosis(name, entry.label, breakdown=found.reason) if isinstance(found, Breakdown) else _checked(given, found)
 
             return Diagnosis(given, tuple(results_in_parallel(pieces, of_body, crews, on_progress or ignore)))
 
 
-def _checked(found: Found | DropspinError | Breakdown) -> Found:
+def _checked(given: str, found: Found | DropspinError | Breakdown) -> Found:
     """What was found in an engine's process, unless the file is at fault."""
     if isinstance(found, Breakdown):
-        raise DropspinError(f"the file cannot be read: {found.reason}.")
+        raise DropspinError(f"{given}: cannot be read: {found.reason}.")
     if isinstance(found, DropspinError):
         raise found
     return found
@@ -221,61 +207,21 @@ def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | 
     except DropspinError as error:
         return DropspinError(str(error))
     facts = body.facts
-    answers = inertia(facts) + [answer for question in QUESTIONS for answer in _answers(body, question)]
+    answers = inertia(facts) + [answer for question in QUESTIONS for answer in answers_to(question, body)]
     if facts.surface:
-        answers.append(Answer("friction", "coefficient of the contact", "1", facts.friction))
-    answers += [Answer("file", key, "", finding="changed", settings=(key,), detail=made) for key, _, made in facts.ignored]
+        answers.append(Answer("friction", COEFFICIENT, "1", measured=facts.friction))
+    answers += [Answer("file", key, "", findings=(Finding("changed", (key,), detail=made),)) for key, _, made in facts.ignored]
     return BodyDiagnosis(
         name=name,
         engine=facts.engine,
+        version=facts.version,
         dt=facts.dt,
         mass=facts.mass,
         shapes=tuple(part.shape.shape for part in facts.colliding),
         surface=facts.surface,
+        others=tuple(facts.others),
         friction=facts.friction,
-        answers=tuple(map(targets.judge, answers)),
+        answers=tuple(targets.judge(body, answer) for answer in answers),
         settings={**facts.settings, **{key: setting for key, setting, _ in facts.ignored}},
         unmodelled=tuple(facts.unmodelled),
     )
-
-
-def _answers(body: LooseBody, question: Question) -> Iterator[Answer]:
-    """The answers to a question, each finding with the remedies that remove it; of a breakdown, the reason."""
-    dt = body.facts.dt
-    try:
-        answers = question(body, [dt * factor for factor in HALVINGS])
-    except Diverged as error:
-        yield Answer(question.__name__, "breakdown", "", finding="time step", settings=("timestep",), detail=str(error))
-        return
-    for number, answer in enumerate(answers):
-        yield _remedied(body, question, number, answer) if answer.finding else answer
-
-
-def _remedied(body: LooseBody, question: Question, number: int, answer: Answer) -> Answer:
-    """A finding with the changes that remove it, each with the value measured with it; the finding is then of the first one's setting."""
-    dt, found = body.facts.dt, {}
-    for setting, finer in product(answer.settings, (False, True)):
-        changes, text, step = *body.remedies.get(setting, ({}, "")), dt
-        if setting == "timestep":
-            excess = abs(answer.measured - answer.in_force) / (100.0 if answer.unit == "%" else abs(answer.in_force) or 1.0) / NOTEWORTHY
-            step = _rounded(dt * (SAFE / excess if excess > 1.0 else 0.25))
-            text = body.time_step.format(step)
-        elif finer and answer.finding == "model":
-            step = _rounded(0.125 * dt)
-            text = text and f"{text}, {body.time_step.format(step)}"
-        if text and finer == (step != dt) and setting not in found:
-            try:
-                again = question(body.changed(changes), [step])
-            except Diverged:
-                continue
-            if number < len(again) and not again[number].finding:
-                found[setting] = Remedy(text, again[number].measured, *body.elsewhere(step, changes))
-    if not found:
-        return answer
-    kind: Finding = "setting" if answer.finding == "model" and "timestep" not in found else answer.finding
-    return replace(answer, finding=kind, settings=tuple(found)[:1], remedies=tuple(found.values()))
-
-
-def _rounded(step: float) -> float:
-    """A time step [s] with two digits."""
-    return float(f"{step:.2g}")

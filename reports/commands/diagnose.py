@@ -21,7 +21,7 @@ from dropspin.reports.commands.options import POSITIVE, as_json, engines_option,
 @jobs_option("bodies to diagnose")
 @output_option("out/diagnosis", "for the tables and the report")
 @as_json
-def diagnose_command(file: str, output: str, restitution: float | None, friction: float | None, json_output: bool, **options: Any) -> int:
+def diagnose_command(file: str, output: str, json_output: bool, **options: Any) -> int:
     """Measure what the settings of your model do: an MJCF or URDF file, or a mesh (.obj, .stl).
 
     Each free body is simulated alone, with the file's own settings, above the surface that it lands on: how it falls, spins, lands,
@@ -29,7 +29,7 @@ def diagnose_command(file: str, output: str, restitution: float | None, friction
 
     Exit code: 0 no impossible inertia and no missed target, 1 otherwise, 2 bad input.
     """
-    from dropspin.comparisons.diagnosis.study import Targets, diagnose
+    from dropspin.comparisons.diagnosis.study import diagnose
     from dropspin.comparisons.results.folder import study_folder
     from dropspin.reports.html.study import study_page
     from dropspin.reports.stories.diagnose import Diagnosed
@@ -39,7 +39,7 @@ def diagnose_command(file: str, output: str, restitution: float | None, friction
 
     with study_folder(output) as folder:
         with share_bar(os.path.basename(file)) as on_progress:
-            found = diagnose(file, targets=Targets(restitution, friction), **options, on_progress=on_progress)
+            found = diagnose(file, **options, on_progress=on_progress)
         study = Diagnosed(diagnosis=found)
         document = write_study(study, folder)
         write_parquet(study, folder)

@@ -1,7 +1,6 @@
 """The output of `dropspin diagnose`: for one body, its answers beside the exact values; for several, a table of all; then the findings."""
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import groupby
@@ -9,7 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import Answer
+from dropspin.comparisons.diagnosis.answers import REBOUND, Answer, Finding, Remedy
+from dropspin.comparisons.diagnosis.inertia import MOMENT
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis, Diagnosis
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
@@ -26,8 +26,10 @@ KINDS = {
     "target": "target missed",
 }
 """The words for the kinds of findings."""
-SEVERAL = re.compile(" about | at ")
-"""What stands before the axis or the speed in a quantity."""
+LEAST = 1e-9
+"""Values below this are rounding, but for moments of inertia."""
+STARTS = {"slide": (" from", " at"), "roll": (" from", "")}
+"""What stands before the speed and the direction of a start, if not `at` and `about`."""
 MOST_NAMES = 4
 COLUMNS = (
     "dt = …: measured at this time step. Exact: the exact solution with the damping, armature and margin in force. "
@@ -42,13 +44,13 @@ class Diagnosed(Study):
     diagnosis: Diagnosis
 
     def rows(self) -> list[dict[str, Any]]:
-        """Every answer, with where its settings are written."""
+        """Every answer, once for each of its findings, with where the settings are written."""
         found = []
         for body in self.diagnosis.bodies:
+            of_body = {"file": self.diagnosis.file, "body": body.name, "engine": body.engine, "version": body.version, "dt": body.dt}
             for answer in body.answers:
-                remedies = "; ".join(_remedies([answer]))
-                values = asdict(answer) | {"settings": "; ".join(_settings(body, answer)), "remedies": remedies}
-                found.append({"file": self.diagnosis.file, "body": body.name, "engine": body.engine, "dt": body.dt, **values})
+                values = {name: value for name, value in asdict(answer).items() if name != "findings"}
+                found += [{**of_body, **values, **_finding_cells(body, answer, finding)} for finding in answer.findings or [None]]
         return found
 
     def document(self) -> Document:
@@ -69,19 +71,29 @@ class Diagnosed(Study):
         return Document(f"Diagnosis of {self.diagnosis.file}", parts, [Paragraph(summary(self.diagnosis))])
 
 
+def _finding_cells(body: BodyDiagnosis, answer: Answer, finding: Finding | None) -> dict[str, str]:
+    """The columns of a finding, empty for none."""
+    if finding is None:
+        return {"finding": "", "settings": "", "remedies": "", "reason": ""}
+    remedies = "; ".join(_remedies((answer, finding)))
+    return {"finding": finding.kind, "settings": "; ".join(_settings(body, finding)), "remedies": remedies, "reason": finding.detail}
+
+
 def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
     """What a page says of a body; a terminal that shows a table of several bodies does not show it."""
     if body.breakdown:
         return [Paragraph(f"{body.name}: {body.breakdown}.", style="bold", on_terminal=on_terminal)]
-    lands = f"; lands on {body.surface}, friction {body.friction:g}" if body.surface else "; lands on nothing"
-    head = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg; {body.engine}, time step {in_ms(body.dt)}{lands}."
+    others = f" (or {_listed(body.others)}, by --on)" if body.others else ""
+    lands = f"; lands on {body.surface}{others}, friction {body.friction:g}" if body.surface else "; lands on nothing"
+    what = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg"
+    head = f"{what}; {body.engine} {body.version}, time step {in_ms(body.dt)}{lands}."
     drawn = charts(body)
     return [
-        Heading(f"{body.name} in {body.engine.split()[0]}"),
+        Heading(f"{body.name} in {body.engine}"),
         Paragraph(head, on_terminal=on_terminal),
         Table(answer_rows(body), on_terminal=on_terminal),
         Sentences([*sentences(body), *_left_out(body)], numbered=True, on_terminal=on_terminal),
-        *([Charts(f"{body.name} {body.engine.split()[0]}", drawn)] if drawn else []),
+        *([Charts(f"{body.name} {body.engine}", drawn)] if drawn else []),
     ]
 
 
@@ -95,7 +107,7 @@ def of_several(bodies: Sequence[BodyDiagnosis]) -> list[str]:
     owners: dict[str, list[str]] = {}
     engines, names = {body.engine for body in bodies}, {body.name for body in bodies}
     for body in bodies:
-        owner = " ".join([body.name] * (len(names) > 1) + [body.engine.split()[0]] * (len(engines) > 1))
+        owner = " ".join([body.name] * (len(names) > 1) + [body.engine] * (len(engines) > 1))
         for sentence in [f"{body.breakdown}."] if body.breakdown else [*sentences(body), *_left_out(body)]:
             owners.setdefault(sentence, []).append(owner)
     return [f"{_listed(of_sentence)}: {sentence}" for sentence, of_sentence in owners.items()]
@@ -106,11 +118,11 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _overview(body: BodyDiagnosis) -> dict[str, str]:
-    kinds = [KINDS[answer.finding] for answer in body.findings]
+    kinds = [KINDS[finding.kind] for _, finding in body.findings]
     found = ", ".join(f"{kind} ({kinds.count(kind)})" if kinds.count(kind) > 1 else kind for kind in dict.fromkeys(kinds))
     return {
         "body": body.name,
-        "engine": body.engine.split()[0],
+        "engine": body.engine,
         "mass": f"{body.mass:.3g} kg",
         "lands on": body.surface or "–",
         "findings": body.breakdown or found or "none",
@@ -120,15 +132,15 @@ def _overview(body: BodyDiagnosis) -> dict[str, str]:
 def answer_rows(body: BodyDiagnosis) -> list[dict[str, str]]:
     """The answers with a value; those about several axes or speeds in one row if they are equal, and the moments of inertia in one row."""
     rows = []
-    moments = [answer for answer in body.answers if answer.question == "inertia" and answer.unit == "kg m²"]
+    moments = [answer for answer in body.answers if answer.quantity == MOMENT]
     ratios = [formatted(answer.measured / answer.physical) for answer in moments]
     if moments:
         rows.append(_row(body, "inertia", "moments / solid's", ", ".join(dict.fromkeys(ratios)), "", "1", ""))
     shown = [answer for answer in body.answers if answer not in moments and answer.question not in ("file", "friction")]
-    shown = [answer for answer in shown if answer.question != "inertia" or answer.finding]
-    for _, group in groupby(shown, lambda answer: (answer.question, _cells(answer), SEVERAL.split(answer.quantity)[0])):
+    for _, group in groupby(shown, lambda answer: (answer.question, answer.quantity, _cells(answer))):
         same = list(group)
-        rows.append(_row(body, same[0].question, _together(same), *_cells(same[0]), KINDS.get(same[0].finding, "")))
+        kinds = ", ".join(dict.fromkeys(KINDS[finding.kind] for finding in same[0].findings))
+        rows.append(_row(body, same[0].question, _together(same), *_cells(same[0]), kinds))
     return rows
 
 
@@ -151,7 +163,9 @@ def _value(value: float, unit: str) -> str:
         return ""
     if math.isinf(value):
         return "never" if unit == "s" else "none"
-    if unit in ("m", "s", "m/s") and 0.0 < abs(value) < 0.1:
+    if abs(value) < LEAST and unit != "kg m²":
+        return with_unit("0", unit)
+    if unit in ("m", "s", "m/s") and abs(value) < 0.1:
         value, unit = 1e3 * value, f"m{unit}"
     if unit == "%":
         return "0 %" if abs(value) < 1e-3 else f"{value:+.3g} %"
@@ -161,58 +175,72 @@ def _value(value: float, unit: str) -> str:
 def sentences(body: BodyDiagnosis) -> list[str]:
     """A sentence for each finding: what is wrong, the settings in the words of the file with their lines, and the remedy that was tried."""
     found = []
-    for _, group in groupby(body.findings, lambda answer: (answer.question, answer.finding, answer.settings, _texts(answer))):
-        same = list(group)
-        what = "; ".join(f"{_together(answers)} {statement}" for statement, answers in grouped(same, _statement).items())
-        where = ", ".join(_settings(body, same[0]))
-        sentence = f"{same[0].question.capitalize()}, {KINDS[same[0].finding]}: {what}" + (f": {where}." if where else ".")
-        found.append(" ".join([sentence, *_remedies(same)]))
+    for same in grouped(body.findings, _shared).values():
+        question, finding = same[0][0].question, same[0][1]
+        stated = grouped(same, _statement).items()
+        what = "; ".join(f"{_together([answer for answer, _ in those])} {statement}" for statement, those in stated)
+        where = ", ".join(_settings(body, finding))
+        sentence = f"{question.capitalize()}, {KINDS[finding.kind]}: {what}" + (f": {where}." if where else ".")
+        found.append(" ".join([sentence, *_remedies(*same)]))
     return found
 
 
-def _texts(answer: Answer) -> tuple[str, ...]:
-    return tuple(remedy.text for remedy in answer.remedies)
+def _shared(found: tuple[Answer, Finding]) -> tuple[object, ...]:
+    """What findings that one sentence names together have in common."""
+    answer, finding = found
+    return answer.question, finding.kind, finding.settings, tuple(remedy.text for remedy in finding.remedies)
 
 
 def _together(answers: Sequence[Answer]) -> str:
-    """The quantities of answers that differ in an axis or a speed, as one."""
-    first, *others = (answer.quantity for answer in answers)
-    return ", ".join([first, *(SEVERAL.split(quantity)[-1] for quantity in others)])
+    """The quantities of answers, those that differ in the speed or the direction of the start as one."""
+    found = []
+    for quantity, same in grouped(answers, lambda answer: answer.quantity).items():
+        from_speed, along = STARTS.get(same[0].question, (" at", " about"))
+        speeds = dict.fromkeys(f"{answer.speed:g}" for answer in same if math.isfinite(answer.speed))
+        directions = dict.fromkeys(answer.direction for answer in same if answer.direction)
+        of_speeds = f"{from_speed} {', '.join(speeds)} m/s" if speeds else ""
+        found.append(quantity + of_speeds + (f"{along} {', '.join(directions)}" if directions else ""))
+    return ", ".join(found)
 
 
-def _remedies(answers: Sequence[Answer]) -> list[str]:
+def _remedies(*same: tuple[Answer, Finding]) -> list[str]:
     """A sentence for each remedy of equal findings, with the values measured with it."""
     found = []
-    for same in zip(*(answer.remedies for answer in answers), strict=True):
-        values = {_value_after(remedy.value, answer): None for remedy, answer in zip(same, answers, strict=True)}
-        text = f"Remedy: {same[0].text}" if math.isnan(same[0].value) else f"Remedy, tried: {same[0].text} gives {', '.join(values)}"
-        if same[0].others or not same[0].runs:
-            others, runs = counted(same[0].others, "other body", "other bodies"), "runs" if same[0].runs else "breaks down"
+    for remedies in zip(*(finding.remedies for _, finding in same), strict=True):
+        pairs = zip(remedies, (answer for answer, _ in same), strict=True)
+        values = {_value_after(remedy, answer): None for remedy, answer in pairs}
+        first = remedies[0]
+        text = f"Remedy: {first.text}" if math.isnan(first.value) else f"Remedy, tried: {first.text} gives {', '.join(values)}"
+        if first.others or not first.runs:
+            others, runs = counted(first.others, "other body", "other bodies"), "runs" if first.runs else "breaks down"
             text += f" (it applies to {others} too, and the whole model {runs} with it)"
         found.append(f"{text}.")
+
     return found
 
 
-def _value_after(value: float, answer: Answer) -> str:
-    """A value that was measured with a remedy: a spin that does not decay has no time to 1/e, but a fraction that is kept."""
-    return f"a fraction of {value:.4g} kept in 1 s" if answer.unit == "s" and answer.question == "spin" else _value(value, answer.unit)
+def _value_after(remedy: Remedy, answer: Answer) -> str:
+    """The value measured with a remedy: a spin that does not decay has no time of its decay, but a fraction that is kept."""
+    value = _value(remedy.value, remedy.unit)
+    return value if remedy.unit == answer.unit else f"a fraction of {value} kept in 1 s"
 
 
-def _statement(answer: Answer) -> str:
+def _statement(found: tuple[Answer, Finding]) -> str:
     """What a sentence states of a quantity."""
+    answer, finding = found
     measured, in_force, physical = _cells(answer)
-    if answer.finding == "impossible":
-        return f"is {measured}, but at most 1 for {answer.detail}"
-    if answer.finding in ("changed", "target"):
-        return f"{measured} ({answer.detail})" if measured and measured != answer.detail else answer.detail
-    wanted = in_force if answer.finding in ("time step", "model") and in_force else physical
-    limit = f", {_value(answer.limit, answer.unit)} as dt → 0" if answer.finding == "time step" and math.isfinite(answer.limit) else ""
+    if finding.kind == "impossible":
+        return f"is {measured}, but at most 1 for {finding.detail}"
+    if finding.detail:
+        return f"{measured} ({finding.detail})" if measured else finding.detail
+    wanted = in_force if finding.is_error and in_force else physical
+    limit = f", {_value(answer.limit, answer.unit)} as dt → 0" if finding.kind == "time step" and math.isfinite(answer.limit) else ""
     return f"is {measured}" + (f" instead of {wanted}" if wanted else "") + limit
 
 
-def _settings(body: BodyDiagnosis, answer: Answer) -> list[str]:
+def _settings(body: BodyDiagnosis, finding: Finding) -> list[str]:
     known = body.settings or {}
-    return [str(known[name]) for name in answer.settings if name in known]
+    return [str(known[name]) for name in finding.settings if name in known]
 
 
 def differences(bodies: Sequence[BodyDiagnosis]) -> list[dict[str, str]]:
@@ -220,28 +248,27 @@ def differences(bodies: Sequence[BodyDiagnosis]) -> list[dict[str, str]]:
     by_quantity: dict[str, dict[str, str]] = {}
     for body in bodies:
         for answer in (one for one in body.answers if one.question != "file"):
-            row = by_quantity.setdefault(f"{answer.question}: {answer.quantity}", {})
-            row[f"{body.engine.split()[0]}, dt = {in_ms(body.dt)}"] = _cells(answer)[0] or _value(answer.in_force, answer.unit)
-    engines = [f"{body.engine.split()[0]}, dt = {in_ms(body.dt)}" for body in bodies]
+            row = by_quantity.setdefault(f"{answer.question}: {_together([answer])}", {})
+            row[f"{body.engine}, dt = {in_ms(body.dt)}"] = _cells(answer)[0] or _value(answer.in_force, answer.unit)
+    engines = [f"{body.engine}, dt = {in_ms(body.dt)}" for body in bodies]
     rows = [{"what": what, **{engine: row.get(engine, "–") for engine in engines}} for what, row in by_quantity.items()]
     return [row for row in rows if len({row[engine] for engine in engines}) > 1]
 
 
 def summary(diagnosis: Diagnosis) -> str:
     """The number of findings and of bodies that have any."""
-    findings = [answer for body in diagnosis.bodies for answer in body.findings]
-    kinds = [KINDS[answer.finding] for answer in findings]
+    kinds = [KINDS[finding.kind] for body in diagnosis.bodies for _, finding in body.findings]
     text = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
     broken = sum(bool(body.breakdown) for body in diagnosis.bodies)
-    return f"{counted(len(findings), 'finding')}{f' ({text})' if text else ''}{f'; {broken} without a result' if broken else ''}."
+    return f"{counted(len(kinds), 'finding')}{f' ({text})' if text else ''}{f'; {broken} without a result' if broken else ''}."
 
 
 def charts(body: BodyDiagnosis) -> list[Chart]:
     """The rebound over the impact speed, with its range over start phases, if there is a rebound."""
-    impacts = [answer for answer in body.answers if answer.question == "impact" and answer.quantity.startswith("rebound")]
+    impacts = [answer for answer in body.answers if answer.quantity == REBOUND]
     if not any(answer.most > 0.0 for answer in impacts):
         return []
-    speeds = np.array([float(answer.quantity.split()[-2]) for answer in impacts])
+    speeds = np.array([answer.speed for answer in impacts])
     lines = [
         Line(
             f"dt = {in_ms(body.dt)}",

@@ -82,8 +82,8 @@ def step(dt: float) -> str:
 
 
 def in_ms(dt: float) -> str:
-    """A time step in milliseconds; → 0 for an extrapolation of several."""
-    return "→ 0" if math.isnan(dt) else f"{1e3 * dt:g} ms"
+    """A time step in milliseconds, with four digits; → 0 for an extrapolation of several."""
+    return "→ 0" if math.isnan(dt) else f"{1e3 * dt:.4g} ms"
 
 
 def unit(of: str) -> str:

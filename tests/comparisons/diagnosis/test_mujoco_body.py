@@ -5,12 +5,14 @@ import math
 import numpy as np
 import pytest
 
+from dropspin.comparisons.diagnosis.answers import REBOUND
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble
 from dropspin.comparisons.diagnosis.friction import slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
-from dropspin.comparisons.diagnosis.study import QUESTIONS, _answers
+from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
+from dropspin.comparisons.diagnosis.study import QUESTIONS
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.state import POSITION, UP
 
@@ -33,15 +35,17 @@ def by_quantity(answers):
     return {answer.quantity: answer for answer in answers}
 
 
-def findings_of(body):
-    return [answer for question in QUESTIONS for answer in _answers(body, question) if answer.finding]
+def findings_of(body, *questions):
+    """Each finding, with its answer."""
+    answers = [answer for question in questions or QUESTIONS for answer in answers_to(question, body)]
+    return [(answer, finding) for answer in answers for finding in answer.findings]
 
 
 def test_healthy_ball_has_no_finding(tmp_path):
     option = 'timestep="1e-3" integrator="RK4" cone="elliptic" impratio="100"'
     body = body_of(tmp_path, FREE.format('<geom size=".05"/>'), option)
     assert findings_of(body) == []
-    assert not any(answer.finding for answer in inertia(body.facts))
+    assert not any(answer.findings for answer in inertia(body.facts))
 
 
 def test_damping_of_a_free_joint_is_named_and_its_time_constants_are_exact(tmp_path):
@@ -52,15 +56,15 @@ def test_damping_of_a_free_joint_is_named_and_its_time_constants_are_exact(tmp_p
     assert [answer.in_force for answer in answers] == pytest.approx((moments / 0.02).tolist(), rel=1e-12)
     h = body.facts.dt  # MuJoCo's implicit damper divides a spin by 1 + h/τ in each step
     assert [answer.measured for answer in answers] == pytest.approx([h / math.log1p(h * 0.02 / moment) for moment in moments], rel=1e-6)
-    assert {answer.finding for answer in answers} == {"setting"}
+    assert {tuple(finding.kind for finding in answer.findings) for answer in answers} == {("setting", "time step")}
     [fallen, terminal] = fall(body, ladder(body))
     assert terminal.in_force == pytest.approx(mass * 9.81 / 0.02, rel=1e-12)
     rate = 0.02 / mass
     assert fallen.in_force == pytest.approx(9.81 / rate * (1.0 - (1.0 - math.exp(-rate)) / rate), rel=1e-9)
-    found = findings_of(body)
-    assert {str(body.facts.settings[name]) for answer in found for name in answer.settings} == {'damping="0.02" (model.xml, line 1)'}
-    assert {remedy.text for answer in found for remedy in answer.remedies} == {"<freejoint/>"}
-    kept = [remedy.value for answer in found for remedy in answer.remedies if answer.question == "spin"]
+    found = [(answer, finding) for answer, finding in findings_of(body) if finding.kind == "setting"]
+    assert {str(body.facts.settings[name]) for _, finding in found for name in finding.settings} == {'damping="0.02" (model.xml, line 1)'}
+    assert {remedy.text for _, finding in found for remedy in finding.remedies} == {"<freejoint/> (model.xml, line 1)"}
+    kept = [remedy.value for answer, finding in found for remedy in finding.remedies if answer.question == "spin"]
     assert kept == pytest.approx([1.0] * 3, rel=1e-9)
 
 
@@ -69,7 +73,7 @@ def test_armature_slows_the_fall_and_is_found_in_a_default_class(tmp_path):
     world = '<body name="b" pos="0 0 1" childclass="a"><joint type="free"/><geom type="box" size=".1 .1 .1" mass="1"/></body>'
     body = body_of(tmp_path, world, head=head)
     [answer] = fall(body, ladder(body))
-    assert (answer.finding, answer.settings) == ("setting", ("armature",))
+    assert (answer.findings[0].kind, answer.findings[0].settings) == ("setting", ("armature",))
     assert answer.in_force == pytest.approx(0.5 * 9.81 / 1.5, rel=1e-9)
     assert str(body.facts.settings["armature"]) == 'armature="0.5" (model.xml, line 3)'
 
@@ -79,15 +83,15 @@ def test_gain_of_energy_is_a_time_step_error_that_rk4_removes(tmp_path):
     body = body_of(tmp_path, world)
     [stated, turned, worst, speed, step] = tumble(body, ladder(body))
     assert stated.measured == pytest.approx(4.148, abs=2e-3)  # by MuJoCo alone: 100 (E(1 s)/E(0) - 1)
-    assert stated.finding == "time step"
+    assert [finding.kind for finding in stated.findings] == ["time step"]
     assert abs(stated.limit) < 0.01
     assert turned.measured == pytest.approx(5.369, abs=5e-3)
     assert worst.measured > 6.4
     assert 3.0 < speed.measured < 10.0
     assert 4e-4 < step.measured < 6e-4
-    [found] = [answer for answer in _answers(body, tumble) if answer.finding]
+    [(_, found)] = findings_of(body, tumble)
     integrator, step = found.remedies
-    assert integrator.text == '<option integrator="RK4"/>'
+    assert integrator.text == '<option integrator="RK4"/> (model.xml, line 1)'
     assert abs(integrator.value) < 1e-6
     assert 'timestep="0.0004' in step.text
     assert step.value == pytest.approx(0.845, abs=0.05)
@@ -114,27 +118,27 @@ def test_depth_at_rest_is_exact(tmp_path, geom, option, points):
 
 def test_margin_lifts_a_body(tmp_path):
     body = body_of(tmp_path, FREE.format('<geom size=".02" margin=".001"/>'))
-    [found] = [answer for answer in _answers(body, rest) if answer.finding]
+    [(answer, found)] = findings_of(body, rest)
     [remedy] = found.remedies
-    assert (found.settings, remedy.text) == (("margin",), 'margin="0"')
-    assert found.measured == pytest.approx(0.00036718184 - 0.001, abs=1e-8)
+    assert (found.settings, remedy.text) == (("margin",), '<geom size=".02" margin="0"/> (model.xml, line 1)')
+    assert answer.measured == pytest.approx(0.00036718184 - 0.001, abs=1e-8)
     assert remedy.value == pytest.approx(0.00036718184, abs=1e-8)
 
 
 def test_default_contact_returns_the_speed_of_a_critically_damped_spring(tmp_path):
     body = body_of(tmp_path, FREE.format('<geom size=".05"/>'), 'timestep="1e-4"')
-    answers = by_quantity(impact(body, [body.facts.dt]))
-    assert answers["largest upward / impact speed at 1 m/s"].measured == pytest.approx(math.exp(-2.0), abs=0.02)  # without gravity
-    assert answers["rebound / impact speed at 1 m/s"].measured == 0.0
-    assert answers["contact at 1 m/s"].detail == "> 0.3 s"
+    answers = {answer.quantity: answer for answer in impact(body, [body.facts.dt]) if answer.speed == 1.0}
+    assert answers["largest upward / impact speed"].measured == pytest.approx(math.exp(-2.0), abs=0.02)  # without gravity
+    assert answers[REBOUND].measured == 0.0
+    assert answers["contact"].detail == "> 0.3 s"
 
 
 def test_coarse_step_scatters_the_rebound_over_start_phases(tmp_path):
     body = body_of(tmp_path, FREE.format('<geom type="box" size=".025 .025 .025"/>'), 'timestep="0.01"')
-    [found] = [answer for answer in _answers(body, impact) if answer.finding]
-    assert (found.finding, found.settings) == ("time step", ("timestep",))
-    assert found.most - found.least > 0.1
-    assert abs(found.limit) < 0.01
+    [(answer, found)] = findings_of(body, impact)
+    assert (found.kind, found.settings) == ("time step", ("timestep",))
+    assert answer.most - answer.least > 0.1
+    assert abs(answer.limit) < 0.01
 
 
 def test_raised_time_constant_of_a_contact_is_said(tmp_path):
@@ -150,20 +154,20 @@ def test_pyramid_is_named_where_friction_depends_on_direction(tmp_path):
     )
     body = body_of(tmp_path, world, on="table")
     assert body.facts.friction == pytest.approx(0.3)
-    answers = by_quantity(_answers(body, slide))
-    assert answers["stopping distance from 0.5 m/s"].finding == ""
-    assert answers["stopping distance from 0.5 m/s"].in_force == pytest.approx(0.25 / (2.0 * 0.3 * 9.81))
-    diagonal = answers["stopping distance from 0.5 m/s at 45°"]
+    along, diagonal, _ = answers_to(slide, body)
+    assert along.findings == ()
+    assert along.in_force == pytest.approx(0.25 / (2.0 * 0.3 * 9.81))
     assert diagonal.measured / diagonal.in_force == pytest.approx(math.sqrt(2.0), abs=0.05)
-    assert (diagonal.finding, diagonal.settings) == ("setting", ("cone",))
-    assert diagonal.remedies[0].text == '<option cone="elliptic"/>'
+    [found] = diagonal.findings
+    assert (found.kind, found.settings) == ("setting", ("cone",))
+    assert found.remedies[0].text == '<option cone="elliptic"/> (model.xml, line 1)'
 
 
 def test_impossible_inertia_is_measured_against_the_shape(tmp_path):
     inertial = '<inertial pos="0 0 0" mass=".1" diaginertia="1e5 1e5 1e5"/>'
     body = body_of(tmp_path, FREE.format(f'{inertial}<geom type="box" size=".015 .015 .12"/>'))
     answer = by_quantity(inertia(body.facts))["largest moment / largest possible"]
-    assert answer.finding == "impossible"
+    assert [finding.kind for finding in answer.findings] == ["impossible"]
     assert answer.measured == pytest.approx(1e5 / (0.1 * (0.015**2 + 0.12**2)), rel=1e-9)
 
 
@@ -245,18 +249,19 @@ def test_fluid_and_wind_act_as_in_mujoco_and_are_named(tmp_path):
     x, _, z = data.qpos[:3] - [0.0, 0.0, 1.0]
     assert abs(x) > 0.1
     assert along[-1, POSITION] - along[0, POSITION] == pytest.approx([x, z, 0.0], abs=1e-9)
-    found = {answer.question: answer for answer in findings_of(body)}
+    found = {answer.question: finding for answer, finding in findings_of(body)}
     assert str(body.facts.settings[found["fall"].settings[0]]) == 'density="1.2" (model.xml, line 1)'
     [remedy] = found["fall"].remedies
-    assert remedy.text == '<option density="0" viscosity="0"/>'
+    assert remedy.text == '<option density="0" wind="3 0 1" viscosity="0"/> (model.xml, line 1)'
     assert remedy.value == pytest.approx(4.905, rel=3e-3)
 
 
 def test_pyramid_is_told_from_dry_friction_of_the_joint(tmp_path):
     world = '<body name="b" pos="0 0 1"><joint type="free" frictionloss=".01"/><geom type="box" size=".05 .05 .02" mass="1"/></body>'
-    found = {answer.quantity: answer for answer in findings_of(body_of(tmp_path, world))}
-    assert found["stopping distance from 0.5 m/s at 45°"].remedies[0].text.startswith('<option cone="elliptic"')
-    assert {answer.settings for answer in found.values() if answer.question == "spin"} == {("frictionloss",)}
+    found = findings_of(body_of(tmp_path, world))
+    [diagonal] = [finding for answer, finding in found if answer.direction == "45°"]
+    assert diagonal.remedies[0].text.startswith('<option cone="elliptic"')
+    assert {finding.settings for answer, finding in found if answer.question == "spin"} == {("frictionloss",)}
 
 
 def test_friction_of_a_urdf_is_not_read(tmp_path):
@@ -266,3 +271,53 @@ def test_friction_of_a_urdf_is_not_read(tmp_path):
     body = body_of(tmp_path, f'<robot name="r"><link name="l">{contact}{mass}{shape}</link></robot>', file="model.urdf")
     assert body.facts.friction == 1.0
     assert [name for name, _, made in body.facts.ignored if made == "not read"] == ["lateral_friction"]
+
+
+def test_an_answer_has_a_finding_for_each_cause(tmp_path):
+    joint = '<joint type="free" armature=".2"/>'
+    world = f'<body name="b" pos="0 0 1">{joint}<geom type="box" size=".05 .05 .02" mass="1" friction=".3" priority="1"/></body>'
+    found = [finding for answer, finding in findings_of(body_of(tmp_path, world), slide) if answer.direction == "45°"]
+    assert [(finding.kind, finding.settings) for finding in found] == [("setting", ("armature",)), ("setting", ("cone",))]
+    armature, cone = (finding.remedies[0] for finding in found)
+    assert armature.text == '<joint type="free" armature="0"/> (model.xml, line 1)'
+    assert cone.text.startswith('<option cone="elliptic"')
+
+
+def test_damping_and_armature_that_both_act_are_removed_together(tmp_path):
+    world = '<body name="b" pos="0 0 1"><joint type="free" armature=".1" damping=".1"/><geom size=".1" mass="1"/></body>'
+    [(_, found)] = findings_of(body_of(tmp_path, world), fall)
+    assert found.settings == ("damping",)
+    assert [remedy.text for remedy in found.remedies] == ["<freejoint/> (model.xml, line 1)"]
+    assert found.remedies[0].value == pytest.approx(0.5 * 9.81 * 1.002, rel=1e-9)  # semi-implicit Euler
+
+
+def test_body_that_tips_over_has_a_row_that_says_so(tmp_path):
+    body = body_of(tmp_path, FREE.format('<geom type="box" size=".01 .01 .1"/>'))
+    [answer] = slide(body, ladder(body))
+    assert (answer.detail, math.isnan(answer.measured)) == ("tips over", True)
+
+
+def test_tied_body_is_not_free_and_what_acts_on_a_body_is_named(tmp_path):
+    bodies = [f'<body name="{name}" pos="{3 * number} 0 1"><freejoint/><geom size=".05"/></body>' for number, name in enumerate("abc")]
+    ties = '<equality><weld body1="a"/></equality><tendon><spatial><site site="s"/><site site="t"/></spatial></tendon>'
+    turned = '<keyframe><key name="turned" qpos="0 0 1 1 0 0 0 3 0 1 0 1 0 0 6 0 1 1 0 0 0"/></keyframe>'
+    bodies[2] = bodies[2].replace("<geom", '<site name="s"/><geom')
+    world = f'{"".join(bodies)}<site name="t" pos="6 0 2"/>'
+    text = f"<mujoco><worldbody>{PLANE}<geom type='box' name='box' size='1 1 .1' pos='9 0 0'/>{world}</worldbody>{ties}{turned}</mujoco>"
+    (tmp_path / "tied.xml").write_text(text)
+    model = MuJoCoModel(tmp_path / "tied.xml", "tied.xml")
+    assert model.bodies([], False) == ["b", "c"]
+    left_out = {name: model.body(name, None).facts.unmodelled for name in "abc"}
+    assert left_out == {"a": ["equality constraints"], "b": ["the pose of keyframe turned"], "c": ["tendons"]}
+    assert model.body("b", None).facts.others == ["box"]
+    assert model.body("b", "box").facts.others == []
+
+
+def test_settings_for_a_restitution_are_tried(tmp_path):
+    for integrator, dt in (("Euler", 2e-3), ("RK4", 2.5e-4)):
+        body = body_of(tmp_path, FREE.format('<geom size=".05"/>'), f'integrator="{integrator}"')
+        [missed] = [Targets(0.5, None).judge(body, answer) for answer in impact(body, [2e-3]) if answer.speed == 3.0]
+        [remedy] = missed.findings[-1].remedies
+        assert remedy.value == pytest.approx(0.5, abs=0.02)
+        assert (f'timestep="{dt:g}"' in remedy.text) is (dt != 2e-3)
+        assert f'solref="{"0 -750" if integrator == "Euler" else "-294912 -277.259"}"' in remedy.text

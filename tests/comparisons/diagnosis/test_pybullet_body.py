@@ -8,18 +8,20 @@ import pytest
 pytest.importorskip("pybullet", exc_type=ImportError)
 
 from dropspin.comparisons.diagnosis import landing
+from dropspin.comparisons.diagnosis.answers import REBOUND
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble
 from dropspin.comparisons.diagnosis.friction import roll, slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.pybullet_body import PyBulletModel
 from dropspin.comparisons.diagnosis.pybullet_server import server
-from dropspin.comparisons.diagnosis.study import _answers
+from dropspin.comparisons.diagnosis.remedies import answers_to
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import UnknownName
 from dropspin.scenarios.rotations import rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY
 
+LIVELY = f"{REBOUND} on a surface with restitution 1"
 DTS = (1.0 / 240.0, 1.0 / 480.0, 1.0 / 960.0)
 BOX, BALL = '<box size=".15 .05 .03"/>', '<sphere radius=".5"/>'
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -47,8 +49,8 @@ def body(folder, *elements, name="a"):
     return model(folder, *elements).body(name, None)
 
 
-def named(answers, quantity):
-    [found] = [answer for answer in answers if answer.quantity == quantity]
+def named(answers, quantity, speed=None):
+    [found] = [answer for answer in answers if answer.quantity == quantity and speed in (None, answer.speed)]
     return found
 
 
@@ -67,7 +69,7 @@ def test_the_default_damping_slows_fall_and_spin_as_the_closed_forms_say(tmp_pat
     assert terminal.in_force == pytest.approx(15.168439615992398, rel=1e-12)
     for answer in spin(block, DTS):
         assert answer.limit == pytest.approx(0.6901699363194228, rel=1e-6)
-        assert (answer.finding, answer.settings) == ("setting", ("damping",))
+        assert (answer.findings[0].kind, answer.findings[0].settings) == ("setting", ("damping",))
     [of_tumble] = tumble(block, DTS)
     assert of_tumble.limit == pytest.approx(of_tumble.in_force, rel=1e-5)
     end = block.motions(block.facts.start()[np.newaxis], 0.01, 1000, -9.81 * UP, floor=False)[0, -1]
@@ -139,21 +141,22 @@ def test_restitution_is_the_product_with_that_of_the_plane(tmp_path):
     assert made == "is 0, the product with 0 of plane.urdf"
     assert ball.changed({"restitution": 1.0}).facts.ignored == []
     answers = impact(ball, DTS[:1])
-    assert named(answers, "rebound / impact speed at 3 m/s").measured == 0.0
-    assert named(answers, "surface with restitution 1, rebound / impact speed at 3 m/s").in_force == 0.5
+    assert named(answers, REBOUND, 3.0).measured == 0.0
+    assert named(answers, LIVELY, 3.0).in_force == 0.5
     lively = ball.changed({"restitution": 1.0, "contactERP": 0.0})
-    assert named(impact(lively, [1e-3]), "rebound / impact speed at 3 m/s").measured == pytest.approx(0.5, rel=0.01)
+    assert named(impact(lively, [1e-3]), REBOUND, 3.0).measured == pytest.approx(0.5, rel=0.01)
 
 
 def test_remedies_are_tried(tmp_path, monkeypatch):
     monkeypatch.setattr(landing, "IMPACTS", (3.0,))
     ball = body(tmp_path, link(BALL, extra='<contact><restitution value="0.5"/></contact>'))
-    of_fall = next(iter(_answers(ball, fall)))
-    assert of_fall.remedies[0].text == "changeDynamics(body, -1, linearDamping=0, angularDamping=0)"
-    assert of_fall.remedies[0].value == pytest.approx(0.5 * 9.81 * (1.0 + DTS[0]), rel=1e-9)  # semi-implicit Euler
-    of_impact = named(list(_answers(ball, impact)), "surface with restitution 1, rebound / impact speed at 3 m/s")
-    assert of_impact.remedies[0].text == "setPhysicsEngineParameter(contactERP=0), setTimeStep(0.00052)"
-    assert (of_impact.finding, of_impact.remedies[0].value) == ("setting", pytest.approx(0.5, rel=0.01))
+    of_fall = next(iter(answers_to(fall, ball)))
+    assert of_fall.findings[0].remedies[0].text == "changeDynamics(body, -1, linearDamping=0, angularDamping=0)"
+    assert of_fall.findings[0].remedies[0].value == pytest.approx(0.5 * 9.81 * (1.0 + DTS[0]), rel=1e-9)  # semi-implicit Euler
+    of_impact = named(list(answers_to(impact, ball)), LIVELY, 3.0)
+    [found] = of_impact.findings
+    assert found.remedies[0].text == "setPhysicsEngineParameter(contactERP=0), setTimeStep(0.00052)"
+    assert (found.kind, found.remedies[0].value) == ("setting", pytest.approx(0.5, rel=0.01))
 
 
 def test_rolling_and_sliding_slow_down_by_friction_and_damping(tmp_path):
@@ -225,7 +228,7 @@ def test_visual_geometry_bounds_the_inertia_and_does_not_collide(tmp_path):
     shell = '<visual><origin xyz="0 0 -.5" rpy="0 0 .3"/><geometry><cylinder radius="1" length="3"/></geometry></visual>'
     mug = body(tmp_path, link(BOX, extra=shell, at='<origin xyz="0 0 .02" rpy=".1 0 0"/>', moments=(0.3, 0.3, 0.1)))
     assert [(part.shape.shape, part.collides) for part in mug.facts.parts] == [("box", True), ("mesh", False)]
-    assert not any(answer.finding for answer in inertia(mug.facts))
+    assert not any(answer.findings for answer in inertia(mug.facts))
     np.testing.assert_allclose(mug.facts.points[:, 2].min(), -2.0 - 0.02, rtol=1e-6)
     assert 0.0 < rest(mug, DTS[:1])[0].measured < 3e-5
 

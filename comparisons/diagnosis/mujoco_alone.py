@@ -1,0 +1,200 @@
+"""The MuJoCo model of one body alone, with the options, the joint and the geometries of the compiled model of a file.
+
+It has one contact pair for each geometry that may touch the surface, with the settings that MuJoCo mixes of both. y is up, and the surface
+is the plane y = 0.
+"""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from dropspin.comparisons.diagnosis.loose_body import Changes
+from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, PLANE, MuJoCoFile, plain, set_options
+from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, mesh_of, quaternion
+from dropspin.comparisons.running.recording import Breakdown
+from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
+from dropspin.scenarios.state import UP, Array
+from dropspin.scenarios.truths.soft_rest import GeomSettings, SoftContact
+
+FRICTION = (0, 2, 3)
+"""The coefficients of a pair that a geometry has: sliding, torsional, rolling."""
+
+
+class MuJoCoAlone:
+    """A body, with what is welded to it, and the surface.
+
+    Args:
+        file: The file.
+        name: The body's name.
+        on: The name of the geometry that it lands on; by default the first plane or box of the world that it collides with.
+        changes: Settings that differ from those of the file.
+
+    Attributes:
+        head: The number of the body in the file's model.
+        group: The numbers of what is welded to it, its own first.
+        geoms: The numbers of their geometries.
+        surface: The number of what it lands on; None for nothing.
+        others: The numbers of what else it collides with and may land on, unless what it lands on was named.
+        pairs: The settings of the contacts with it, by geometry.
+        dof: The number of the first degree of freedom of the free joint; None without one.
+    """
+
+    def __init__(self, file: MuJoCoFile, name: str, on: str | None, changes: Changes) -> None:
+        self.file, old, self._changes = file, file.model, changes
+        self.head = file.heads[name]
+        self.group = file.group(self.head)
+        self.geoms = [geom for geom in range(old.ngeom) if old.geom_bodyid[geom] in self.group]
+        names = list(file.names(GEOM, old.ngeom))
+        for geom in self.geoms:
+            if int(old.geom_type[geom]) not in map(int, MODELLED):
+                kind = mujoco.mjtGeom(int(old.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
+                raise Breakdown("declined", f"its geometry {names[geom]!r} is of the type {kind}, which is not modelled")
+        self.surface = file.surface(on, self.geoms)
+        self.others = file.surfaces(self.geoms)[1:] if on is None else []
+        self.pairs: dict[int, dict[str, Any]] = {}
+        if self.surface is not None and file.has_contacts:
+            contacts = {geom: file.contact(geom, self.surface) for geom in self.geoms}
+            self.pairs = {geom: contact for geom, contact in contacts.items() if contact is not None}
+        joint = old.body_jntadr[self.head]
+        is_free = joint >= 0 and old.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
+        self.dof = int(old.jnt_dofadr[joint]) if is_free else None
+        self._models: dict[Any, Any] = {}
+
+    def changed(self, changes: Changes) -> "MuJoCoAlone":
+        """The same with other settings."""
+        new = object.__new__(MuJoCoAlone)
+        vars(new).update(vars(self), _changes=changes, _models={})
+        return new
+
+    def model(self, dt: float, gravity: Array, *, floor: bool) -> Any:
+        """The model, compiled once for each set of arguments.
+
+        Args:
+            dt: Time step [s].
+            gravity: Acceleration [m/s²], shape (3,).
+            floor: Whether the surface is there.
+        """
+        key = (dt, tuple(gravity), floor)
+        if key not in self._models:
+            spec = mujoco.MjSpec()
+            set_options(spec.option, self.file.model.opt, dt, self._changes)
+            spec.option.gravity = gravity
+            spec.option.wind = rotate(self.level, self.file.model.opt.wind)
+            spec.compiler.degree = False
+            self._add_bodies(spec)
+            if floor:
+                self._add_surface(spec)
+            self._models[key] = spec.compile()
+        return self._models[key]
+
+    def _add_bodies(self, spec: Any) -> None:
+        """The body, with what is welded to it, and its joint."""
+        old = self.file.model
+        places: dict[int, Any] = {}
+        for body in self.group:
+            is_head = body == self.head
+            parent = spec.worldbody if is_head else places[old.body_parentid[body]]
+            at = {} if is_head else {"pos": old.body_pos[body], "quat": old.body_quat[body]}
+            new = places[body] = parent.add_body(gravcomp=self._changes.get("gravcomp", old.body_gravcomp[body]), **at)
+            if is_head:
+                joint = new.add_freejoint()
+                joint.damping, joint.armature = self.damping, self.armature
+                if self.dof is not None and "frictionloss" not in self._changes:
+                    joint.frictionloss = old.dof_frictionloss[self.dof]
+            if old.body_mass[body] > 0.0:
+                moments = np.array(old.body_inertia[body])
+                largest = int(np.argmax(moments))
+                moments[largest] = min(moments[largest], np.nextafter(moments.sum() - moments[largest], 0.0))
+                new.explicitinertial, new.mass, new.inertia = True, old.body_mass[body], moments
+                new.ipos, new.iquat = old.body_ipos[body], old.body_iquat[body]
+            for geom in self.geoms:
+                if old.geom_bodyid[geom] == body:
+                    new.add_geom(mass=0.0, name=f"own {geom}", contype=0, conaffinity=0, **self._geom(spec, geom))
+
+    @property
+    def damping(self) -> Array:
+        """The coefficients of the joint's damping, of |v| to the powers 0, 1 and 2."""
+        old = self.file.model
+        if self.dof is None or "damping" in self._changes:
+            return np.zeros(3)
+        return np.array([old.dof_damping[self.dof], *getattr(old, "dof_dampingpoly", np.zeros((old.nv, 2)))[self.dof]])
+
+    @property
+    def armature(self) -> float:
+        """What the joint adds to the mass [kg] and to each moment of inertia [kg m²]."""
+        is_there = self.dof is not None and "armature" not in self._changes
+        return float(self.file.model.dof_armature[self.dof]) if is_there else 0.0
+
+    def _geom(self, spec: Any, geom: int) -> dict[str, Any]:
+        """What a geometry is and where, as the compiled model has it."""
+        old = self.file.model
+        found = {"type": old.geom_type[geom], "size": old.geom_size[geom], "pos": old.geom_pos[geom], "quat": old.geom_quat[geom]}
+        found |= {"fluid_ellipsoid": int(old.geom_fluid[geom, 0]), "fluid_coefs": old.geom_fluid[geom, 1:6]}
+        if old.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
+            return found
+        points, faces = mesh_of(old, geom)
+        mesh = spec.add_mesh(name=f"mesh {geom}", uservert=points.ravel(), userface=faces.ravel())
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        return found | {"meshname": f"mesh {geom}"}
+
+    def _add_surface(self, spec: Any) -> None:
+        """What the body lands on, level and with its top at y = 0, and the contact pairs."""
+        file, old = self.file, self.file.model
+        assert self.surface is not None
+        turn = multiply(self.level, quaternion(file.data.geom_xmat[self.surface]))
+        top = old.geom_size[self.surface] @ np.abs(unrotate(turn, UP)) if old.geom_type[self.surface] == BOX else 0.0
+        at = {"pos": -top * UP, "quat": np.roll(turn, 1)}
+        spec.worldbody.add_geom(name="surface", contype=0, conaffinity=0, **self._geom(spec, self.surface) | at)
+        for geom, pair in self.pairs.items():
+            spec.add_pair(geomname1="surface", geomname2=f"own {geom}", **self._in_force(pair))
+
+    def _in_force(self, pair: Mapping[str, Any]) -> dict[str, Any]:
+        """The settings of a contact, with the time constant that MuJoCo raises to two of the file's steps."""
+        changed = {name: self._changes[name] for name in ("solref", "solimp") if name in self._changes}
+        still = {"margin": 0.0, "gap": 0.0} if "margin" in self._changes else {}
+        return dict(pair) | {"solref": self.clamped(pair)} | {name: as_numbers(value) for name, value in changed.items()} | still
+
+    def clamped(self, pair: Mapping[str, Any]) -> Array:
+        """The time constant and the damping ratio that are in force at the file's time step."""
+        option, (constant, ratio) = self.file.model.opt, pair["solref"]
+        is_safe = not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE
+        return np.array([max(constant, 2.0 * option.timestep) if constant > 0.0 and is_safe else constant, ratio])
+
+    @property
+    def touching(self) -> dict[str, Any] | None:
+        """The settings in force of the first contact pair."""
+        return next(map(self._in_force, self.pairs.values()), None)
+
+    @property
+    def contact(self) -> SoftContact | None:
+        """The contact of a body with one contact pair."""
+        touching = self.touching
+        if touching is None or len(self.pairs) != 1:
+            return None
+        option = self.model(self.file.model.opt.timestep, np.zeros(3), floor=False).opt
+        friction = tuple(touching["friction"][list(FRICTION)].tolist())
+        names = ("solref", "solimp", "condim", "margin")
+        settings = GeomSettings(friction=friction, **{name: plain(np.asarray(touching[name])) for name in names})
+        is_safe = not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE
+        return SoftContact(settings, option.cone == ELLIPTIC, option.impratio, option.timestep if is_safe else 0.0)
+
+    @cached_property
+    def level(self) -> Array:
+        """The rotation from the file's world to one in which the surface is level, or gravity vertical, and y is up."""
+        file, old = self.file, self.file.model
+        g = file.gravity
+        up = -g / np.linalg.norm(g) if g.any() else np.array([0.0, 0.0, 1.0])
+        if self.surface is not None:
+            axes = file.data.geom_xmat[self.surface].reshape(3, 3).T
+            up = axes[2] if old.geom_type[self.surface] == PLANE else max((*axes, *-axes), key=lambda axis: float(axis @ up))
+        axis = np.cross(up, UP)
+        sine = np.linalg.norm(axis)
+        return about(axis / sine if sine else np.array([1.0, 0.0, 0.0]), np.arctan2(sine, up @ UP))
+
+
+def as_numbers(text: str | float) -> Array:
+    """The numbers of an attribute."""
+    return np.array([float(value) for value in str(text).split()])

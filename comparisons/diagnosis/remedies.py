@@ -1,0 +1,97 @@
+"""Remedies of findings: what removes them, tried on the body."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+from dropspin.comparisons.diagnosis.answers import COEFFICIENT, NOTEWORTHY, REBOUND, Answer, Finding, Kind, Remedy
+from dropspin.comparisons.diagnosis.landing import rebound
+from dropspin.comparisons.diagnosis.loose_body import LooseBody
+from dropspin.comparisons.engines.base import Diverged
+
+HALVINGS = (1.0, 0.5, 0.25)
+SAFE = 0.85
+"""Factor on the time step at which an error of first order would be as large as a finding."""
+Question = Callable[[LooseBody, Sequence[float]], list[Answer]]
+"""A function of a body and of time steps, of which the first is judged."""
+
+
+@dataclass(frozen=True)
+class Targets:
+    """What the user wants of a body: a coefficient of restitution and of friction; None for no target."""
+
+    restitution: float | None = None
+    friction: float | None = None
+
+    def judge(self, body: LooseBody, answer: Answer) -> Answer:
+        """An answer that misses its target as a finding, with settings for the restitution if they come closer."""
+        wanted = {REBOUND: self.restitution, COEFFICIENT: self.friction}.get(answer.quantity)
+        if wanted is None or abs(answer.measured - wanted) <= NOTEWORTHY:
+            return answer
+        remedies: list[Remedy] = []
+        if answer.quantity == REBOUND:
+            for step in (body.facts.dt, _rounded(0.125 * body.facts.dt)):
+                changes = body.for_restitution(wanted, step)
+                other = rebound(body.changed(changes), [step], answer.speed, REBOUND)
+                remedies = [Remedy(body.patch(changes, step), other.measured, other.unit, *body.elsewhere(step, changes))]
+                if abs(other.measured - wanted) <= NOTEWORTHY:
+                    break
+        finding = Finding("target", remedies=tuple(remedies), detail=f"the target is {wanted:g}")
+        return replace(answer, findings=(*answer.findings, finding))
+
+
+def answers_to(question: Question, body: LooseBody) -> Iterator[Answer]:
+    """The answers to a question, each finding with the remedies that remove it; of a breakdown, the reason."""
+    dt = body.facts.dt
+    try:
+        answers = question(body, [dt * factor for factor in HALVINGS])
+    except Diverged as error:
+        yield Answer(question.__name__, "breakdown", "", findings=(Finding("time step", ("timestep",), detail=str(error)),))
+        return
+
+    @cache
+    def again(settings: tuple[str, ...], step: float) -> list[Answer]:
+        """The answers with the remedies of some settings at another time step [s]; none of a breakdown."""
+        try:
+            return question(body.tried(settings), [step])
+        except Diverged:
+            return []
+
+    for number, answer in enumerate(answers):
+        findings = [_remedied(body, answer, finding, lambda *tried, n=number: again(*tried)[n : n + 1]) for finding in answer.findings]
+        yield replace(answer, findings=tuple(findings))
+
+
+def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable[[tuple[str, ...], float], list[Answer]]) -> Finding:
+    """A finding with the changes that remove it, each with the value measured with it; the finding is then of the first one's settings."""
+    found: dict[tuple[str, ...], Remedy] = {}
+    for settings, step in _tries(body, answer, finding):
+        if settings in found or (len(settings) > 1 and found):
+            continue
+        for other in again(settings, step):
+            if not any(one.is_error == finding.is_error or body.facts.unknown for one in other.findings):
+                changes = body.changes(settings)
+                found[settings] = Remedy(body.patch(changes, step), other.measured, other.unit, *body.elsewhere(step, changes))
+    if not found:
+        return finding
+    kind: Kind = "setting" if finding.kind == "model" and () not in found else finding.kind
+    return replace(finding, kind=kind, settings=next(iter(found)) or ("timestep",), remedies=tuple(found.values()))
+
+
+def _tries(body: LooseBody, answer: Answer, finding: Finding) -> Iterator[tuple[tuple[str, ...], float]]:
+    """The settings whose effect to take away, one by one, then together, and the time step [s]."""
+    dt, known = body.facts.dt, [name for name in finding.settings if name in body.remedies]
+    for name in known:
+        yield (name,), dt
+        if finding.kind == "model":
+            yield (name,), _rounded(0.125 * dt)
+    if "timestep" in finding.settings:
+        excess = abs(answer.measured - answer.in_force) / (100.0 if answer.unit == "%" else abs(answer.in_force) or 1.0) / NOTEWORTHY
+        yield (), _rounded(dt * (SAFE / excess if excess > 1.0 else 0.25))
+    if len(known) > 1 and not finding.is_error:
+        yield tuple(known), dt
+
+
+def _rounded(step: float) -> float:
+    """A time step [s] with two digits."""
+    return float(f"{step:.2g}")

@@ -17,6 +17,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -47,13 +48,18 @@ class FreeRotor:
         motion: Function of times that returns orientations and angular velocities.
         largest_spin: The largest magnitude of ω [rad/s].
         is_steady: Whether ω is constant.
-        horizon: Time up to which one eps of the start leaves the motion determined [s]: `rotor_horizon`.
+        find_horizon: Function that returns `horizon`, which takes longer than the motion.
     """
 
     motion: Rotor
     largest_spin: float
     is_steady: bool
-    horizon: float
+    find_horizon: Callable[[], float]
+
+    @cached_property
+    def horizon(self) -> float:
+        """Time up to which one eps of the start leaves the motion determined [s]: `rotor_horizon`."""
+        return self.find_horizon()
 
     def __call__(self, t: Array) -> tuple[Array, Array]:
         """Orientations (n, 4) and angular velocities (n, 3), world frame, at times [s], shape (n,)."""
@@ -74,11 +80,14 @@ def free_rotor(inertia: Array, orientation: Array, angular_velocity: Array) -> F
     inertia, unit_spin = inertia / heaviest, angular_velocity / fastest  # so that no product leaves the range of doubles
     moments, axes = principal_axes(inertia)
     spin = _along(axes, orientation, unit_spin)
-    rounding = spin_rounding(orientation, unit_spin)
-    if not is_diagonal(inertia):  # the axes are rounded too
-        rounding = np.full(3, EPS * float(np.linalg.norm(unit_spin)))
-    ascending = np.argsort(moments, kind="stable")
-    until = horizon(tuple(moments[ascending].tolist()), tuple(spin[ascending]), rounding[ascending]) / fastest
+
+    def until() -> float:
+        rounding = spin_rounding(orientation, unit_spin)
+        if not is_diagonal(inertia):  # the axes are rounded too
+            rounding = np.full(3, EPS * float(np.linalg.norm(unit_spin)))
+        ascending = np.argsort(moments, kind="stable")
+        return horizon(tuple(moments[ascending].tolist()), tuple(spin[ascending]), rounding[ascending]) / fastest
+
     if all(moments[m] == moments[n] or spin[m] == 0 or spin[n] == 0 for m, n in ((0, 1), (1, 2), (2, 0))):
         return FreeRotor(principal_spin(orientation, angular_velocity), float(np.linalg.norm(angular_velocity)), True, until)
     top = AsymmetricTop(inertia, orientation, unit_spin)

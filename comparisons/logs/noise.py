@@ -6,9 +6,11 @@
 
     cov(w(s), w(t)) = slow² (s³/3 + s² (t - s)/2),    cov(w'(s), w(t)) = slow² min(s, t) (t - min(s, t)/2),    cov(w'(t), w'(t)) = slow² t
 
+w counts as motion of the body: the state at the end of a flight contains it.
+
 Source: G. Wahba, J. R. Stat. Soc. B 40 (1978), 364 (the integrated Wiener process); D. A. Harville, J. Am. Stat. Assoc. 72 (1977), 320
-(restricted likelihood, which leaves out β and θ); K. L. Lange, R. J. A. Little & J. M. G. Taylor, J. Am. Stat. Assoc. 84 (1989), 881 (weights
-of a t distribution).
+(restricted likelihood, which leaves out β and θ); K. L. Lange, R. J. A. Little & J. M. G. Taylor, J. Am. Stat. Assoc. 84 (1989), 881
+(weights of a t distribution).
 """
 
 from collections.abc import Sequence
@@ -58,9 +60,10 @@ class Samples:
 
     @cached_property
     def spectrum(self) -> tuple[Array, Array]:
-        """Eigenvalues of the covariance of w for slow = 1, shape (n,), and the products of all columns in each, shape (n, k + m + 1, k + m + 1).
+        """Eigenvalues of the covariance of w for slow = 1, shape (n,), and the products of all columns in each.
 
-        The columns are own, shared and values, the latter two less what the own ones fit, so that squares keep the digits of the noise.
+        The products have shape (n, k + m + 1, k + m + 1). The columns are own, shared and values, the latter two less what the own ones
+        fit, so that squares keep the digits of the noise.
         """
         eigenvalues, modes = np.linalg.eigh(Noise(0.0, 1.0).covariance(self.t))
         own = self.own.reshape(self.values.size, -1)
@@ -111,7 +114,8 @@ class Regression:
         by_noise = np.linalg.pinv(whole, hermitian=True)
         if len(self.weights) < FEWEST:
             return by_noise
-        without = np.array([-np.linalg.pinv(whole - own, hermitian=True) @ score for own, score in zip(self.information, self.scores, strict=True)])
+        each = zip(self.information, self.scores, strict=True)
+        without = np.array([-np.linalg.pinv(whole - own, hermitian=True) @ score for own, score in each])
         moved = without - without.mean(axis=0)
         found = (len(moved) - 1) / len(moved) * moved.T @ moved
         wider = np.sqrt(np.maximum(np.diag(by_noise) / np.maximum(np.diag(found), np.finfo(float).tiny), 1.0))
@@ -125,6 +129,8 @@ class Regression:
         return float(stdtrit(max(len(self.weights) - 1, 1), 0.975)) * np.sqrt(np.diag(self.covariance))
 
 
+ROUNDING = 8.0 * float(np.finfo(float).eps)
+"""Smallest noise, as a share of the largest value: sums and products of a few terms."""
 FEWEST = 5
 """Flights from which on their differences give the interval; with fewer, the noise does."""
 
@@ -136,6 +142,7 @@ def regression(flights: Sequence[Samples]) -> Regression:
     typical = float(np.median([samples.t[-1] for samples in flights]))
     unit = np.sqrt(3.0 / typical**3)
     freedom = np.array([samples.freedom for samples in flights])
+    rounding = ROUNDING * max(float(np.abs(samples.values).max()) for samples in flights)
     weights, shared = np.ones(len(flights)), flights[0].shared.shape[2]
 
     def parts(log_ratio: float) -> tuple[Array, Array, float]:
@@ -143,17 +150,21 @@ def regression(flights: Sequence[Samples]) -> Regression:
         products = np.array([product for product, _ in reduced])
         return products, _solution(products, weights, shared), sum(determinant for _, determinant in reduced)
 
+    def left_over(products: Array, theta: Array) -> Array:
+        residual = np.append(theta, -1.0)
+        return np.maximum(np.einsum("i,kij,j->k", residual, products, residual), freedom * rounding**2)
+
     def deviance(log_ratio: float) -> float:
         products, theta, determinant = parts(log_ratio)
-        squares = float(weights @ _squares(products, theta))
+        squares = float(weights @ left_over(products, theta))
         left = int(freedom.sum()) - shared
-        return determinant + left * np.log(max(squares, np.finfo(float).tiny)) + _log_determinant(products, weights, shared)
+        return determinant + left * np.log(squares) + _log_determinant(products, weights, shared)
 
     for _ in range(ROUNDS):
         ratio = float(minimize_scalar(deviance, bounds=(SLOWEST, FASTEST), method="bounded", options={"xatol": 0.02}).x)
         products, theta, _ = parts(ratio)
-        squares = _squares(products, theta)
-        variance = max(float(weights @ squares) / (int(freedom.sum()) - shared), np.finfo(float).tiny)
+        squares = left_over(products, theta)
+        variance = float(weights @ squares) / (int(freedom.sum()) - shared)
         weights = (TAILS + freedom) / (TAILS + squares / variance)
         theta = _solution(products, weights, shared)
     noise = Noise(np.sqrt(variance), np.sqrt(variance) * unit * 10.0**ratio)
@@ -165,12 +176,7 @@ def regression(flights: Sequence[Samples]) -> Regression:
 
 def _solution(products: Array, weights: Array, shared: int) -> Array:
     whole = np.tensordot(weights, products, axes=1)
-    return np.linalg.lstsq(whole[:shared, :shared], whole[:shared, shared], rcond=None)[0]
-
-
-def _squares(products: Array, theta: Array) -> Array:
-    left = np.append(theta, -1.0)
-    return np.einsum("i,kij,j->k", left, products, left)
+    return np.asarray(np.linalg.lstsq(whole[:shared, :shared], whole[:shared, shared], rcond=None)[0], float)
 
 
 def _log_determinant(products: Array, weights: Array, shared: int) -> float:

@@ -1,0 +1,89 @@
+"""Flights in recordings that are made by formula, whose parameters, starts and noise are known."""
+
+import numpy as np
+import pytest
+from support.tosses import made
+
+from dropspin.comparisons.logs.flights import Flights, flights_of
+from dropspin.comparisons.logs.noise import Noise
+from dropspin.scenarios.rotations import rotation_vector
+from dropspin.scenarios.state import Array
+
+DOWN = np.array([0.0, -9.81, 0.0])
+OFFSET = (0.001, -0.002, 0.003)
+
+
+def found(log: object) -> Flights:
+    flights = flights_of(log, DOWN)  # type: ignore[arg-type]
+    assert flights is not None
+    return flights
+
+
+def misses(flights: Flights, exact: object) -> Array:
+    """Starts less the exact states, in standard deviations of the starts, shape (tosses, 12)."""
+    rows = []
+    for start in flights.starts():
+        state = exact[int(start.toss.name)](start.toss.t[start.frame])  # type: ignore[index]
+        turned = rotation_vector(state[3:7], start.state[3:7])
+        error = np.concatenate([start.state[:3] - state[:3], turned, start.state[7:] - state[7:]])
+        rows.append(error / np.sqrt(np.diag(start.covariance)))
+    return np.array(rows)
+
+
+def test_without_noise_the_parameters_of_the_flights_are_exact() -> None:
+    # ln(I_x/I_y) and ln(I_z/I_y) are relative to the header's inertia; rounding of 0.1 m in a parabola of 0.1 s is 1e-16 × 8 / 0.01.
+    recording = made(1, 8, offset=OFFSET, header={"tracked_point": OFFSET})
+    flights = found(recording.log)
+    np.testing.assert_allclose(flights.moving.values, [*DOWN, *OFFSET, 0.0], atol=1e-10)
+    np.testing.assert_allclose(flights.turning.values, 0.0, atol=1e-8)
+    for start in flights.starts():
+        np.testing.assert_allclose(start.state, recording.exact[int(start.toss.name)](start.toss.t[start.frame]), atol=1e-9)
+
+
+def test_a_flight_ends_at_the_last_frame_but_one_before_the_impact() -> None:
+    recording = made(2, 12, (2e-4, 2e-3))
+    for flight, impact in zip(found(recording.log).found, recording.impacts, strict=True):
+        last = flight.toss.t[flight.end - 1]
+        assert flight.first == 0
+        assert impact - 2.0 / 148.0 <= last < impact
+
+
+def test_the_noise_is_found() -> None:
+    flights = found(made(3, 20, (2e-4, 2e-3)).log)
+    assert flights.moving.noise.white == pytest.approx(2e-4, rel=0.1)
+    assert flights.turning.noise.white == pytest.approx(2e-3, rel=0.1)
+
+
+def test_covariance_of_slow_errors_is_that_of_a_twice_integrated_white_noise() -> None:
+    # By quadrature: w(t) = ∫ (t - u) dB(u), hence cov(w(s), w(t)) = ∫ (s - u)(t - u) du up to the smaller time.
+    t = np.array([0.1, 0.25, 0.7])
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    for i, j in np.ndindex(3, 3):
+        until = min(t[i], t[j])
+        u = until * (nodes + 1.0) / 2.0
+        expected = until / 2.0 * np.sum(weights * (t[i] - u) * (t[j] - u))
+        assert Noise(0.0, 2.0).covariance(t)[i, j] == pytest.approx(4.0 * expected, rel=1e-14)
+
+
+@pytest.mark.parametrize("count", [10, 30])
+def test_intervals_of_parameters_and_starts_hold(count: int) -> None:
+    # 60 starts × 12 components, which depend on each other in pairs: the share inside has a standard deviation of 0.011.
+    inside, starts = [], []
+    for seed in range(60 // count):
+        recording = made(100 + seed, count, (2e-4, 2e-3), offset=OFFSET, header={"tracked_point": OFFSET})
+        flights = found(recording.log)
+        error = flights.moving.values[:6] - [*DOWN, *OFFSET]
+        inside += [*(np.abs(error) < flights.moving.half_widths), *(np.abs(flights.turning.values) < flights.turning.half_widths)]
+        starts.append(np.abs(misses(flights, recording.exact)) < 1.96)
+    assert np.mean(inside) > 0.85
+    assert 0.915 < np.mean(np.concatenate(starts)) < 0.985
+
+
+def test_a_toss_that_errs_much_more_than_the_others_does_not_move_the_result() -> None:
+    recording = made(5, 20, (2e-4, 2e-3))
+    before = found(recording.log)
+    spoilt = recording.log.tosses[3]
+    spoilt.position[:] += 0.5 * np.outer(spoilt.t**2, [0.0, 3.0, 0.0])  # gravity of 6.81 m/s² in one toss of 20
+    after = found(recording.log)
+    assert after.moving.weights[3] < 0.25
+    assert np.abs(after.moving.values - before.moving.values)[1] < 0.25 * 3.0 / 20.0

@@ -36,7 +36,7 @@ def test_every_source_is_complete(name):
     """Its scenes are valid, its quantities exist, and each case has a digit for each quantity."""
     [source] = sources([name])
     assert source.formula in ("", *FORMULAS)
-    assert source.formula or source.groups
+    assert source.formula or source.groups or source.data
     for scene in source.scenes:
         source.scene(scene)
     for group in source.groups:

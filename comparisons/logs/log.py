@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from dropspin.comparisons.logs.columns import ORIENTATION, POSITION, SPIN, VELOCITY, read_columns
-from dropspin.comparisons.running.belonging import is_uneven, problems_of_order
+from dropspin.comparisons.running.belonging import is_uneven, missing_frames, problems_of_order
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.errors import DropspinError, UnknownName
 from dropspin.scenarios.loading import read_toml, with_mesh
@@ -39,8 +39,6 @@ UPRIGHT = {
 """The rotation, a quaternion, that takes the upward axis of a recording to y."""
 NEAR_UNIT = 0.05
 """Largest difference from 1 of the length of a quaternion; two digits round it by 0.01."""
-GAP = 1.5
-"""Frame intervals from which a step of the times has a missing frame."""
 MOVES = 0.1
 """Share of a toss's largest step from which a body moves: below, rounding may repeat a row."""
 OTHER_RATE = 2e-3
@@ -248,10 +246,9 @@ def _repeated(toss: Toss) -> Iterator[Irregularity]:
 def _uneven(toss: Toss) -> Iterator[Irregularity]:
     """Missing frames, and times that are not equally spaced beside them."""
     steps = np.diff(toss.t)
-    usual = float(np.median(steps))
-    wide = steps > GAP * usual
-    for frame in np.flatnonzero(wide):
-        yield Irregularity("gap", toss.name, int(frame) + 1, float(np.rint(steps[frame] / usual)) - 1.0, 0.0)
-    if is_uneven(steps[~wide]):
-        worst = int(np.argmax(np.where(wide, 0.0, np.abs(steps - usual))))
+    missing, usual = missing_frames(steps), float(np.median(steps))
+    for frame in np.flatnonzero(missing):
+        yield Irregularity("gap", toss.name, int(frame) + 1, float(missing[frame]), 0.0)
+    if is_uneven(steps[missing == 0]):
+        worst = int(np.argmax(np.where(missing, 0.0, np.abs(steps - usual))))
         yield Irregularity("jitter", toss.name, worst + 1, float(steps[worst]), usual)

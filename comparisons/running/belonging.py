@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 UNEVEN = 0.01
 """Largest difference of a time step from the mean, as a share of it; times in text files are rounded."""
+GAP = 1.5
+"""Usual steps of time from which a step has a missing state: the nearest whole number of steps is then above 1."""
 GROSS = 0.1
 """Difference, of angles [rad] and relative to sizes and speeds, that a fault of conventions exceeds."""
 EXPLAINED = 0.1
@@ -55,9 +57,19 @@ def is_uneven(steps: Array) -> bool:
     return bool(len(steps)) and float(np.ptp(steps)) > UNEVEN * float(steps.mean())
 
 
+def missing_frames(steps: Array) -> NDArray[np.int64]:
+    """How many frames are missing within each step of time [s], shape (n,): steps that are longer than the usual one."""
+    shares = steps / np.median(steps)
+    return np.where(shares > GAP, np.rint(shares).astype(int) - 1, 0)
+
+
 def _of_times(motion: Trajectory) -> Iterator[str]:
     yield from problems_of_order(motion.t)
     steps = np.diff(motion.t)
+    missing = missing_frames(steps)
+    if missing.any() and not is_uneven(steps[missing == 0]):
+        states = counted(int(missing.sum()), "state is", "states are")
+        yield f"{states} missing between equal steps, the first after {motion.t[np.argmax(missing > 0)]:.4g} s; give all of them"
     if is_uneven(steps):
         yield (
             f"the times are not equally spaced: steps are {steps.min():.4g} to {steps.max():.4g} s long; interpolate the states at equal "

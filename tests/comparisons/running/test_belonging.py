@@ -54,6 +54,11 @@ MISMATCHES = {
     "milliseconds": (BALL, lambda t, rows: (1e3 * t, rows), "the times appear to be in ms"),
     "microseconds": (FLIGHT.model_copy(update={"start": BALL.start.model_copy(update={"velocity": (1.0, 0.0, 0.0)})}), None, "µs"),
     "jitter": (BALL, jittered, "the times are not equally spaced: steps are 0.000"),
+    "gap": (
+        BALL,
+        lambda t, rows: (np.delete(t, [300, 301, 500]), np.delete(rows, [300, 301, 500], axis=0)),
+        "3 states are missing between equal steps, the first after 0.299 s",
+    ),
     "backwards": (BALL, lambda t, rows: (t[::-1], rows), "the times do not increase"),
     "no velocities": (BALL, with_part(slice(7, 10), np.zeros_like), "velocities are 0 while the position changes"),
 }

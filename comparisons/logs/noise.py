@@ -99,6 +99,7 @@ class Regression:
         weights: Of each flight, shape (flights,): its noise has this factor in 1 / variance.
         information: Of each flight, shape (flights, m, m).
         scores: Derivatives of each flight's log likelihood at θ, shape (flights, m).
+        freedom: How many numbers are left beside all parameters.
     """
 
     values: Array
@@ -106,6 +107,7 @@ class Regression:
     weights: Array
     information: Array
     scores: Array
+    freedom: int
 
     @cached_property
     def covariance(self) -> Array:
@@ -123,10 +125,18 @@ class Regression:
 
     @property
     def half_widths(self) -> Array:
-        """Of the 95 % intervals of θ, shape (m,): quantiles of Student's t with the flights less one as degrees of freedom."""
+        """Of the 95 % intervals of θ, shape (m,)."""
+        return self.half_widths_of(0.05)
+
+    def half_widths_of(self, outside: float) -> Array:
+        """Of intervals that θ is outside of with a probability, shape (m,): quantiles of Student's t.
+
+        Its degrees of freedom are the flights less one, with few flights the numbers less the parameters.
+        """
         from scipy.special import stdtrit
 
-        return float(stdtrit(max(len(self.weights) - 1, 1), 0.975)) * np.sqrt(np.diag(self.covariance))
+        freedom = len(self.weights) - 1 if len(self.weights) >= FEWEST else self.freedom
+        return float(stdtrit(freedom, 1.0 - outside / 2.0)) * np.sqrt(np.diag(self.covariance))
 
 
 ROUNDING = 8.0 * float(np.finfo(float).eps)
@@ -171,7 +181,7 @@ def regression(flights: Sequence[Samples]) -> Regression:
     scale = weights / variance
     information = scale[:, np.newaxis, np.newaxis] * products[:, :shared, :shared]
     scores = scale[:, np.newaxis] * (products[:, :shared, shared] - products[:, :shared, :shared] @ theta)
-    return Regression(theta, noise, weights, information, scores)
+    return Regression(theta, noise, weights, information, scores, int(freedom.sum()) - shared)
 
 
 def _solution(products: Array, weights: Array, shared: int) -> Array:

@@ -1,0 +1,85 @@
+"""What the frames at rest show: heights on known faces, which give the scale of lengths and where the tracked point is.
+
+    height = s (-mean_k (R (r_k - p))_y) + R_y · δ,    k the lowest vertices
+
+s is the scale of the recorded lengths, r_k the vertices and p the tracked point in the frame of the shape, δ the error of p.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dropspin.comparisons.logs.log import Log, Toss
+from dropspin.scenarios.bodies.surface import depth_below_centre
+from dropspin.scenarios.rotations import length, rotate, rotation_vector, unrotate
+from dropspin.scenarios.state import UP, Array
+
+STILL = 0.005
+"""Largest movement of frames at rest, as a share of the body's size, and largest turn [rad]."""
+FEWEST_FRAMES = 5
+"""Frames at rest that a toss needs."""
+FEWEST_RESTS = 6
+"""Rests that the scale and three components of δ need."""
+LEVEL = 0.04
+"""Heights of vertices, as a share of the size of the body, that count as equal: a turn of 2 degrees."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rests:
+    """Tosses that end at rest.
+
+    Attributes:
+        orientations: At rest, shape (k, 4).
+        heights: Of the tracked point above the floor [m], shape (k,).
+        expected: The same by the shape [m], shape (k,).
+    """
+
+    orientations: Array
+    heights: Array
+    expected: Array
+
+    def scale(self) -> tuple[float, float, Array, Array]:
+        """The scale and its standard error, δ [m] and its own, shape (3,): NaN along axes of which not both faces were seen."""
+        values, errors = np.full(4, np.nan), np.full(4, np.nan)
+        if len(self.heights) < FEWEST_RESTS:
+            return np.nan, np.nan, values[1:], errors[1:]
+        up = unrotate(self.orientations, np.broadcast_to(UP, (len(self.heights), 3)))
+        seen = [0, *(axis + 1 for axis in range(3) if up[:, axis].min() < -0.9 and up[:, axis].max() > 0.9)]
+        columns = np.column_stack([self.expected, up])[:, seen]
+        values[seen] = np.linalg.lstsq(columns, self.heights, rcond=None)[0]
+        left = self.heights - columns @ values[seen]
+        errors[seen] = np.sqrt(float(left @ left) / (len(left) - len(seen)) * np.diag(np.linalg.inv(columns.T @ columns)))
+        return float(values[0]), float(errors[0]), values[1:], errors[1:]
+
+
+def rests(log: Log) -> Rests:
+    """The tosses of a recording whose last frames do not move."""
+    body, found = log.header.body, [toss for toss in log.tosses if _is_still(toss, log.header.body.size)]
+    orientations = np.array([toss.orientation[-1] for toss in found]).reshape(-1, 4)
+    heights = np.array([toss.position[-FEWEST_FRAMES:, 1].mean() for toss in found])
+    tracked = np.asarray(log.header.tracked_point) - body.centre
+    offsets = rotate(orientations[:, np.newaxis], body.vertices - tracked)[..., 1]
+    if not found:
+        return Rests(orientations, heights, heights)
+    lowest = offsets.min(axis=1, keepdims=True)
+    # A face that is not quite level in the record rests as the mean of its corners does.
+    level = np.mean(offsets, axis=1, where=offsets < lowest + LEVEL * body.size)
+    return Rests(orientations, heights, depth_below_centre(orientations, body.semi_axes) - level)
+
+
+def level_share(log: Log) -> tuple[float, int]:
+    """The share of the rests in which at least three vertices are the lowest ones, and how many rests there are; NaN of round bodies."""
+    body, orientations = log.header.body, rests(log).orientations
+    if body.semi_axes.any() or not len(orientations):
+        return np.nan, len(orientations)
+    heights = np.sort(rotate(orientations[:, np.newaxis], body.vertices)[..., 1], axis=1)
+    return float(np.mean(heights[:, 2] - heights[:, 0] < LEVEL * body.size)), len(orientations)
+
+
+def _is_still(toss: Toss, size: float) -> bool:
+    last = slice(-FEWEST_FRAMES, None)
+    if len(toss) < 2 * FEWEST_FRAMES:
+        return False
+    moved = length(toss.position[last] - toss.position[-1]).max()
+    turned = length(rotation_vector(toss.orientation[last], np.broadcast_to(toss.orientation[-1], (FEWEST_FRAMES, 4)))).max()
+    return bool(moved < STILL * size and turned < STILL)

@@ -1,0 +1,130 @@
+"""Faults planted into sound recordings: each is named, as alternatives where the motion cannot tell them apart."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from support.tosses import BRICK, made
+
+from dropspin.comparisons.logs.check import Check, Finding, log_check
+from dropspin.comparisons.logs.log import Log, Toss, load_log
+from dropspin.scenarios.errors import DropspinError
+from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
+
+NOISE = (2e-4, 2e-3)
+CUBE = {"shape": "box", "half_extents": [0.05, 0.05, 0.05], "mass": 0.4, "inertia": [6.7e-4] * 3}
+ON_SIDE = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
+
+
+def sound(seed: int = 1, count: int = 10, body: dict[str, Any] = CUBE, **others: Any) -> Log:
+    return made(seed, count, NOISE, header={"body": body}, **others).log
+
+
+def changed(log: Log, **changes: Callable[[Toss], Any]) -> Log:
+    """The recording with parts of each toss changed."""
+    return replace(log, tosses=tuple(replace(toss, **{name: change(toss) for name, change in changes.items()}) for toss in log.tosses))
+
+
+def only(check: Check) -> Finding:
+    assert len(check.findings) == 1, check.findings
+    return check.findings[0]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_sound_recording_has_no_finding(seed: int) -> None:
+    assert log_check(sound(seed)).findings == ()
+
+
+def test_short_lengths_and_a_low_rate_are_alternatives() -> None:
+    # In free flight alone, length / time² is all there is: 0.98 = 0.99².
+    for wrong in (changed(sound(), position=lambda toss: 0.98 * toss.position), changed(sound(), t=lambda toss: toss.t / 0.99)):
+        found = only(log_check(wrong))
+        assert found.kind == "scale"
+        assert any(text.startswith("lengths are 2.0% short") or text.startswith("lengths are 1.9% short") for text in found.alternatives)
+        assert any(text.startswith("the rate is 1.0% low") for text in found.alternatives)
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1 / 0.0254, "inch"), (1000.0, "mm")])
+def test_another_unit_of_length_is_named(factor: float, unit: str) -> None:
+    found = only(log_check(changed(sound(), position=lambda toss: factor * toss.position)))
+    assert (found.kind, found.cure) == ("unit", f'length_unit = "{unit}"')
+
+
+def test_another_upward_axis_is_named() -> None:
+    lying = changed(
+        sound(), position=lambda toss: rotate(ON_SIDE, toss.position), orientation=lambda toss: multiply(ON_SIDE, toss.orientation)
+    )
+    found = only(log_check(lying))
+    assert (found.kind, found.cure) == ("up", 'up = "z"')
+
+
+@pytest.mark.parametrize(
+    ("change", "cure"),
+    [
+        (lambda toss: np.roll(toss.orientation, 1, axis=1), 'quaternion = "wxyz"'),
+        (lambda toss: conjugate(toss.orientation), 'rotation = "world-to-body"'),
+    ],
+)
+def test_another_reading_of_quaternions_is_named_by_the_motion_of_a_brick(change: Callable[[Toss], Any], cure: str) -> None:
+    found = only(log_check(changed(sound(count=8, body=BRICK), orientation=change)))
+    assert (found.kind, found.cure) == ("quaternion", cure)
+
+
+def test_the_order_of_quaternions_of_a_cube_is_named_by_the_faces_it_rests_on() -> None:
+    # A cube turns at a constant spin, which it does in any order of the quaternion's numbers.
+    cube = load_log("toss-cube")
+    some = replace(cube, tosses=cube.tosses[:12])
+    wrong = changed(some, orientation=lambda toss: multiply([-np.sqrt(0.5), 0, 0, np.sqrt(0.5)] * np.ones(4), _rolled(toss)))
+    kinds = {finding.kind: finding.cure for finding in log_check(wrong).findings}
+    assert kinds["quaternion"].startswith('quaternion = "wxyz"')
+
+
+def _rolled(toss: Toss) -> Any:
+    return np.roll(multiply(np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]), toss.orientation), 1, axis=1)
+
+
+def test_a_point_beside_the_centre_is_a_pair_of_alternatives() -> None:
+    found = only(log_check(sound(offset=(0.0, 0.005, 0.0), spin=8.0)))
+    assert found.kind == "centre of mass"
+    assert len(found.alternatives) == 2
+    assert "center_of_mass" in found.cure
+    assert "tracked_point" in found.cure
+
+
+def test_a_missing_frame_is_named_with_its_place() -> None:
+    log = sound(count=8)
+    toss = log.tosses[3]
+    kept = np.delete(np.arange(len(toss)), 7)
+    shorter = replace(toss, t=toss.t[:-1], position=toss.position[kept], orientation=toss.orientation[kept])
+    found = only(log_check(replace(log, tosses=(*log.tosses[:3], shorter, *log.tosses[4:]))))
+    assert (found.kind, found.what) == ("frame dropped", "toss 3: 1 missing before frame 7")
+
+
+def test_a_spin_in_the_body_frame_is_named() -> None:
+    with_spin = changed(sound(), angular_velocity=lambda toss: np.zeros((len(toss), 3)))
+    check = log_check(with_spin)
+    assert check.flights is not None
+    rotors = {rotor.flight.toss.name: rotor for rotor in check.flights.rotations}
+    given = changed(with_spin, angular_velocity=lambda toss: unrotate(toss.orientation, rotors[toss.name](toss.t)[1]))
+    assert [finding.cure for finding in log_check(given).findings] == ['spin_frame = "body"']
+
+
+def test_the_shipped_cube_has_short_lengths_and_an_eccentric_mass() -> None:
+    # Intervals of an independent evaluation of the same tosses: gravity -9.623 to -9.579 m/s², centre of mass 4.4 to 6.7 mm along z.
+    check = log_check(load_log("toss-cube"))
+    kinds = {finding.kind: finding for finding in check.findings}
+    values = {value.name: value for value in check.values}
+    assert 9.579 < values["gravity"].value < 9.623
+    assert 0.00438 < values["centre of mass, z"].value < 0.00673
+    assert values["centre of mass, x"].low < 0.0 < values["centre of mass, x"].high
+    assert kinds["scale"].cure == "length_scale = 0.9779"
+    assert not kinds["centre of mass"].alternatives
+    assert kinds["centre of mass"].cure.startswith("[body] center_of_mass")
+
+
+def test_a_recording_without_free_flight_is_refused() -> None:
+    still = changed(sound(count=2), position=lambda toss: 0.0 * toss.position)
+    with pytest.raises(DropspinError, match="free flight"):
+        log_check(still)

@@ -10,6 +10,9 @@ HEAVY_ENGINES := mjx mujoco-warp newton sapien exudyn jsbsim genesis rapier-js
 # A package of npm, which takes the place of an extra.
 NPM_rapier-js := @dimforge/rapier3d-compat
 
+# Many processes start in tests: with the bytecode of the package kept, beside numba's kernels, each costs a third.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: report test test-browser test-engines test-all fuzz faults coverage bench examples docs site lint clean
 
 report: $(VENV)/.installed            ## set up, run the core catalogue, say where the report is

@@ -71,9 +71,10 @@ def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[...
     damping_of = read_damping if parts.damping else read_nothing
     floor_of = (read_floor_with_edges if parts.edges else read_floor) if parts.floor else read_nothing
     turn = ROTATIONS[methods.rotation].turn if parts.turning else None
-    law = LAWS[methods.law].impulse
-    collide = COLLIDE[methods.contact][methods.law]
-    correction = CORRECTIONS[methods.correction]
+    touches = parts.floor or parts.walls > 0  # otherwise methods that differ in contacts alone have one kernel
+    law = LAWS[methods.law].impulse if touches else None
+    collide = COLLIDE[methods.contact][methods.law] if touches else None
+    correction = CORRECTIONS[methods.correction] if touches else None
     correct = None if correction is None else correction.correct
     walls_of, wall_count = _walls_of if parts.walls else _no_walls, parts.walls
     load, rows_of, record = (_load, _rows_of, _record) if width == 1 else (lanes.load, lanes.rows_of, lanes.record)

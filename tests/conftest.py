@@ -105,8 +105,8 @@ def engine_processes():
 
 @pytest.fixture
 def few_start_phases(monkeypatch):
-    """Four start phases instead of eight, for engines made for tests: they solve each start anew, and are as exact from each."""
-    monkeypatch.setattr("dropspin.comparisons.running.start_phases.START_PHASES", 4)
+    """Two start phases instead of eight, for engines made for tests: they solve each start anew, and are as exact from each."""
+    monkeypatch.setattr("dropspin.comparisons.running.start_phases.START_PHASES", 2)
 
 
 @pytest.fixture

@@ -83,8 +83,9 @@ def test_mujoco_has_no_restitution_by_default():
         assert apparent("mujoco[profile=default]", 0.95, dt) < 0.05
 
 
-def test_error_of_the_defaults_alone_is_a_setting_error():
+def test_error_of_the_defaults_alone_is_a_setting_error(monkeypatch):
     """It does not vanish as dt → 0 and the calibrated profile does not have it; without that profile in the run it is a model error."""
+    monkeypatch.setattr("dropspin.comparisons.running.start_phases.QUICK_START_PHASES", 2)
     ball = load("drop-ball").model_copy(update={"duration": 0.8})
     steps = [5e-4, 2.5e-4, 1.25e-4]  # by default no ball bounces at such steps; at coarser ones some do
     both = run(ball, ["pybullet", "pybullet[profile=default]"], steps, quick=True)

@@ -37,20 +37,21 @@ def strays(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize("arguments", [("list", "engines"), ("show", "drop-ball"), ("doctor",), RUN], ids=lambda given: given[0])
+@pytest.mark.parametrize("arguments", [("doctor",), RUN], ids=lambda given: given[0])
 def test_strays_in_the_working_directory_are_not_imported(arguments, strays):
     done = spawn(*arguments, cwd=strays)
     assert done.returncode == 0, done.stderr
     assert not list(strays.glob("imported-*"))
 
 
-def test_plots_ignore_settings_of_the_working_directory(strays):
+def test_plots_ignore_settings_of_the_working_directory_and_the_backend_of_a_notebook(strays):
+    """Also one that is not installed."""
     elsewhere = strays / "elsewhere"
     elsewhere.mkdir()
     (elsewhere / "ball.toml").write_text(BALL)
     assert dropspin(*RUN, cwd=elsewhere).returncode == 0
     shutil.copytree(elsewhere / "out", strays / "out")
-    done = spawn("report", "out", "--plots", "svg", cwd=strays)
+    done = spawn("report", "out", "--plots", "svg", cwd=strays, MPLBACKEND="module://not_installed.backend_inline")
     assert (done.returncode, done.stderr) == (0, "")
     assert dropspin("report", "out", "--plots", "svg", cwd=elsewhere).returncode == 0
     first, second = ((strays / name / "out" / "plots") for name in ("", "elsewhere"))
@@ -143,13 +144,6 @@ def test_run_is_resumed_with_scenes_of_the_same_adapter_only(tmp_path):
     done = dropspin(*command, "--resume", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "measured again, not resumed: since the interrupted run, the code of stopping changed" in done.stderr
-
-
-def test_backend_of_a_notebook_that_is_not_installed_does_not_prevent_plots(tmp_path):
-    (tmp_path / "ball.toml").write_text(BALL)
-    assert dropspin(*RUN, cwd=tmp_path).returncode == 0
-    done = spawn("report", "out", "--plots", "svg", cwd=tmp_path, MPLBACKEND="module://not_installed.backend_inline")
-    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("threads", ["0", "-1", " 00 "])

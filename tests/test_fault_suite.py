@@ -62,7 +62,8 @@ def test_planted_fault_is_detected_in_one_scene(title, scene):
 
 def test_correct_engine_passes_in_some_scenes():
     assert (
-        failed_checks(NUMBERS["single precision, declared"], ["drop-ball", "spin-dzhanibekov", "slide-box", "roll-ball", "roll-slope"]) == []
+        failed_checks(NUMBERS["single precision, declared"], ["drop-ball", "spin-dzhanibekov", "slide-box", "roll-ball", "roll-slope"])
+        == []
     )
 
 

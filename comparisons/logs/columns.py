@@ -3,6 +3,7 @@
 import io
 import json
 import struct
+import warnings
 import zipfile
 import zlib
 from collections.abc import Callable, Collection
@@ -31,7 +32,18 @@ LARGEST_FILE = 200_000_000  # bytes
 MOST_ROWS = 1_000_000
 LONGEST_NAME = 100
 """Characters of the name of a toss."""
-DAMAGED = (ValueError, ArithmeticError, LookupError, OSError, RuntimeError, TypeError, struct.error, zipfile.BadZipFile, zlib.error)
+DAMAGED = (
+    ValueError,
+    ArithmeticError,
+    LookupError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    EOFError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 """What the libraries raise for a damaged file."""
 Columns = dict[str, Any]
 """By name, a sequence of one value a row."""
@@ -91,7 +103,12 @@ def _csv(raw: bytes, given: str) -> Columns:
     names = [str(name) for name in pd.read_csv(io.BytesIO(raw), nrows=0, index_col=False, skipinitialspace=True).columns]
     _verify(given, names)
     options: dict[str, Any] = {"dtype": {TOSS: str}, "low_memory": False}
-    table = pd.read_csv(io.BytesIO(raw), nrows=MOST_ROWS + 1, index_col=False, skipinitialspace=True, **options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", pd.errors.ParserWarning)  # it would leave out values
+        try:
+            table = pd.read_csv(io.BytesIO(raw), nrows=MOST_ROWS + 1, index_col=False, skipinitialspace=True, **options)
+        except pd.errors.ParserWarning:
+            raise DropspinError(f"{given}: rows have more values than the first line has names; name every column.") from None
     _verify(given, names, len(table))
     return {name: table[name] for name in names}
 

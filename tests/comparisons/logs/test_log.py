@@ -201,6 +201,14 @@ ARRAYS = {
 }
 
 
+def test_values_without_a_name_are_refused(tmp_path):
+    header = written(tmp_path, POSE)
+    text = (tmp_path / "toss.csv").read_text()
+    (tmp_path / "toss.csv").write_text("\n".join([line + ",0" if number else line for number, line in enumerate(text.splitlines())]))
+    with pytest.raises(DropspinError, match=r"toss\.csv: rows have more values than the first line has names; name every column\.$"):
+        load_log(header)
+
+
 @pytest.mark.parametrize("case", ARRAYS)
 def test_wrong_array_is_one_line(tmp_path, case):
     columns, message = ARRAYS[case]

@@ -60,12 +60,13 @@ def read_study(folder: str) -> Document:
     """
     from dropspin.reports.stories.diagnose import Diagnosed
     from dropspin.reports.stories.limits import Limits
+    from dropspin.reports.stories.log_check import CheckedLog
     from dropspin.reports.stories.reproduce import Reproduction
     from dropspin.reports.stories.symmetries import Symmetries
     from dropspin.reports.stories.tradeoff import TradeOffs
 
     studies: TypeAdapter[Study] = TypeAdapter(
-        Annotated[Diagnosed | Limits | Reproduction | Symmetries | TradeOffs, Field(discriminator="study")]
+        Annotated[CheckedLog | Diagnosed | Limits | Reproduction | Symmetries | TradeOffs, Field(discriminator="study")]
     )
     try:
         document = studies.validate_json(read_stored(Path(folder), SECTION)).document()

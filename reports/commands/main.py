@@ -22,6 +22,9 @@ GROUPS = {
         "diagnose": "Measure what the settings of your own model do.",
         "calibrate": "Print the settings that give a coefficient of restitution at a time step.",
     },
+    "Compare with a recording": {
+        "log check": "Check a recording of tosses by their free flight.",
+    },
     "Judge": {
         "check": "Check a run against the expectations of its scenes and a baseline.",
         "accept": "Accept a run's results as the new baseline.",
@@ -156,6 +159,8 @@ class _LazyGroup(click.Group):
         name = " ".join(args[:words])
         if name in MOVED:
             raise click.UsageError(f"{name} is now: dropspin {MOVED[name]}.")
+        if below := [command for command in COMMANDS if command.startswith(f"{name} ") and name not in COMMANDS]:
+            raise click.UsageError(f"{name} needs a word more: {', '.join(below)}.", ctx)
         if name not in COMMANDS and not name.startswith("-"):
             from dropspin.scenarios import UnknownName
 

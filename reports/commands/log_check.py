@@ -1,0 +1,38 @@
+"""`dropspin log check`."""
+
+import os
+
+import click
+
+from dropspin.reports.commands.options import as_json, output_option
+
+
+@click.command("check")
+@click.argument("recording", metavar="RECORDING")
+@output_option("out/log-check", "for the tables and the report")
+@as_json
+def log_check_command(recording: str, output: str, json_output: bool) -> int:
+    """Check a recording of tosses by their free flight.
+
+    RECORDING is a header, a TOML file that names the body, the units and the file of data; or toss-cube, 100 measured tosses of a cube.
+    Gravity, scale, drag, inertia and centre of mass are found from the flights alone, each with a 95 % interval, and wrong units, axes,
+    orders and rates are named with the remedy.
+
+    Exit code: 0 no finding, 1 a finding, 2 bad input.
+    """
+    from dropspin.comparisons.logs.check import log_check
+    from dropspin.comparisons.logs.log import load_log
+    from dropspin.comparisons.results.folder import study_folder
+    from dropspin.reports.html.study import study_page
+    from dropspin.reports.stories.log_check import CheckedLog
+    from dropspin.reports.study_files import write_parquet, write_study
+    from dropspin.reports.terminal.rows import print_json_or
+
+    log = load_log(recording)
+    with study_folder(output) as folder:
+        study = CheckedLog.of(recording, log_check(log))
+        document = write_study(study, folder)
+        write_parquet(study, folder)
+        (folder / "report.html").write_text(study_page(document), encoding="utf-8")
+    print_json_or(json_output, study.rows(), document, os.path.join(output, "report.html"))
+    return int(bool(study.findings))

@@ -1,0 +1,93 @@
+"""The output of `dropspin log check`: what the flights of a recording show, each value with its interval; then what is wrong with it."""
+
+import math
+from dataclasses import asdict
+from typing import Any, Literal
+
+import numpy as np
+
+from dropspin.comparisons.logs.check import Check, Finding, TossFacts, Value
+from dropspin.reports.document import Charts, Document, Heading, Paragraph, Sentences, Table
+from dropspin.reports.plots.chart import Chart, Line
+from dropspin.reports.stories.numbers import capitalized, formatted, grouped
+from dropspin.reports.stories.study import Study
+from dropspin.scenarios.text import counted
+
+SMALL = 0.1
+"""Lengths and angles below this are shown in mm and mrad [m, rad]."""
+DIGITS = 2
+"""Significant digits of the half width of an interval, to which a value is shown."""
+MOST_ALIKE = 3
+"""Findings of one kind that a terminal shows."""
+
+
+class CheckedLog(Study):
+    """What `dropspin log check` found."""
+
+    study: Literal["log_check"] = "log_check"
+    recording: str
+    values: list[Value]
+    findings: list[Finding]
+    tosses: list[TossFacts]
+
+    @classmethod
+    def of(cls, recording: str, check: Check) -> "CheckedLog":
+        """The study of a check."""
+        return cls(recording=recording, values=list(check.values), findings=list(check.findings), tosses=list(check.tosses))
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Every value, every finding and every toss, each with the columns of all."""
+        rows = [{"row": kind, **asdict(row)} for kind in ("values", "findings", "tosses") for row in getattr(self, kind)]
+        columns = dict.fromkeys(name for row in rows for name in row)
+        return [{name: row.get(name) for name in columns} for row in rows]
+
+    def document(self) -> Document:
+        """The values, the findings, and on a page the tosses."""
+        frames = np.array([toss.frames for toss in self.tosses], dtype=float)
+        flights = counted(int((frames > 0).sum()), "flight")
+        head = f"{self.recording}: {counted(len(self.tosses), 'toss', 'tosses')}, {flights} of {int(frames.sum()):,} frames in all."
+        noise = Line("toss", frames, np.array([toss.noise for toss in self.tosses]), width=0.0, marker="o")
+        parts = [sentence(finding) for finding in self.findings]
+        kinds = grouped(self.findings, lambda finding: finding.kind)
+        brief = [sentence for group in kinds.values() for sentence in _brief(group)]
+        return Document(
+            f"Check of {self.recording}",
+            [
+                Paragraph(head),
+                Table([_row(value) for value in self.values]),
+                Sentences(parts, numbered=True, on_terminal=False),
+                Sentences(brief, on_page=False),
+                Heading("Flights"),
+                Charts("flights", [Chart("frames of free flight", "noise / median noise of the tosses", [noise])]),
+            ],
+            [Paragraph(f"{counted(len(parts), 'finding')}.")],
+        )
+
+
+def _row(value: Value) -> dict[str, str]:
+    """A value with its interval; of one that is not identifiable, what it needs."""
+    name, small = {"quantity": value.name}, value.unit in ("m", "rad") and abs(value.value) < SMALL
+    scale, unit = (1e3, f"m{value.unit}") if small else (1.0, value.unit)
+    if value.note is not None:
+        return {**name, "value": "not identifiable", "95 % interval": f"needs {value.note}"}
+    half = 0.5 * scale * (value.high - value.low)
+    if not half > 0.0:
+        return {**name, "value": f"{formatted(scale * value.value)} {unit}".strip(), "95 % interval": ""}
+    decimals = max(DIGITS - 1 - math.floor(math.log10(half)), 0)
+    middle, low, high = (f"{scale * number:.{decimals}f}" for number in (value.value, value.low, value.high))
+    return {**name, "value": f"{middle} {unit}".strip(), "95 % interval": f"{low} to {high}"}
+
+
+def sentence(finding: Finding) -> str:
+    """What was found, as alternatives where that is all the recording shows, with what shows or separates them, and the remedy."""
+    parts = [f"{finding.what}{': either ' if finding.alternatives else ''}{', or '.join(finding.alternatives)}."]
+    if finding.separates:
+        parts.append(f"{'Separated' if finding.alternatives else 'Shown'} by: {finding.separates}.")
+    parts += [f"Remedy: {finding.cure}."] if finding.cure else []
+    return capitalized(" ".join(parts))
+
+
+def _brief(findings: list[Finding]) -> list[str]:
+    """The sentences of findings of one kind, of which there may be one for each toss."""
+    more = len(findings) - MOST_ALIKE
+    return [*map(sentence, findings[:MOST_ALIKE]), *([f"And {more} more of this kind ({findings[0].kind})."] if more > 0 else [])]

@@ -1,0 +1,91 @@
+"""`dropspin log check`: output, files and exit codes of sound and faulty recordings, and wrong command lines."""
+
+import json
+import re
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import tomlkit
+from support.cli import TERMINAL, assert_refused, dropspin
+from support.tosses import BRICK, made
+
+from dropspin.comparisons.logs.check import Finding
+from dropspin.reports.stories.log_check import CheckedLog, sentence
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """A folder with a sound recording of ten tosses, toss.toml, whose columns are in mm."""
+    tosses = made(1, 10, (2e-4, 2e-3)).log.tosses
+    rows = {
+        "toss": np.repeat([toss.name for toss in tosses], [len(toss) for toss in tosses]),
+        "t": np.concatenate([toss.t for toss in tosses]),
+        **dict(zip("xyz", 1e3 * np.vstack([toss.position for toss in tosses]).T, strict=True)),
+        **dict(zip(["qx", "qy", "qz", "qw"], np.vstack([toss.orientation for toss in tosses]).T, strict=True)),
+    }
+    np.savez(tmp_path / "toss.npz", **rows)
+    for name, keys in {"toss": {}, "short": {"length_scale": 1.02}}.items():
+        (tmp_path / f"{name}.toml").write_text(tomlkit.dumps({"data": "toss.npz", "length_unit": "mm", **keys, "body": BRICK}))
+    return tmp_path
+
+
+def test_sound_recording_has_values_and_no_finding(recording):
+    done = dropspin("log", "check", "toss.toml", cwd=recording, **TERMINAL)
+    assert done.returncode == 0, done.stdout + done.stderr
+    lines = done.stdout.splitlines()
+    assert len(lines) <= 40
+    assert max(map(len, lines)) <= 80
+    assert lines[0].startswith("toss.toml: 10 tosses, 10 flights of ")
+    assert lines[-2:] == ["0 findings.", "Written: out/log-check/report.html"]
+    folder = recording / "out/log-check"
+    rows = json.loads((folder / "log_check.json").read_text())
+    assert len(rows) == pq.read_table(folder / "log_check.parquet").num_rows
+    [gravity] = [row for row in rows if row["name"] == "gravity"]
+    assert gravity["low"] < 9.81 < gravity["high"]
+    assert "10 tosses, 10 flights" in (folder / "report.html").read_text()
+    assert CheckedLog.model_validate_json((folder / "section.json").read_text()).findings == []
+
+
+def test_finding_is_printed_with_alternatives_and_remedy_and_is_exit_code_1(recording):
+    done = dropspin("log", "check", "short.toml", "-o", "out", cwd=recording)
+    assert done.returncode == 1
+    said = r"Gravity is .* m/s²: either lengths are (.*)% short, or the rate is (.*)% low\. Separated by: .* Remedy: length_scale = "
+    found = re.search(said, done.stdout)
+    assert found is not None, done.stdout
+    assert [float(number) for number in found.groups()] == pytest.approx([2.0, 1.0], abs=0.3)
+    data = json.loads(dropspin("log", "check", "short.toml", "-o", "out", "--json", cwd=recording).stdout)
+    assert [row["kind"] for row in data if row["row"] == "findings"] == ["scale"]
+
+
+def test_many_findings_of_one_kind_are_shortened_on_a_terminal_alone():
+    findings = [Finding("gap", f"toss {number}: a frame is missing") for number in range(5)]
+    study = CheckedLog(recording="r", values=[], findings=findings, tosses=[])
+    texts = [list(part.items) for part in study.document().parts if part.kind == "sentences"]
+    assert [len(items) for items in texts] == [5, 4]
+    assert texts[1][-1] == "And 2 more of this kind (gap)."
+
+
+def test_sentence_of_a_finding_with_one_cause_says_what_shows_it():
+    found = Finding("scale", "lengths are 2 % short", (), "length_scale = 0.98", "heights at rest are 0.98 of the expected ones")
+    expected = "Lengths are 2 % short. Shown by: heights at rest are 0.98 of the expected ones. Remedy: length_scale = 0.98."
+    assert sentence(found) == expected
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("log",), "log needs a word more: log check"),
+        (("log", "check", "toss-cub"), "recording 'toss-cub' is unknown. Did you mean 'toss-cube'?"),
+        (("log", "check", "toss.npz"), "toss.npz: is the data of a recording; give its header"),
+        (("log", "check", "absent.toml"), "absent.toml: No such file or directory"),
+        (("log", "check", "still.toml"), "no toss has "),
+    ],
+)
+def test_wrong_recordings_are_refused_and_nothing_is_written(arguments, message, recording):
+    rows = {name: np.full(50, float(name == "qw")) for name in ("x", "y", "z", "qx", "qy", "qz", "qw")}
+    np.savez(recording / "still.npz", **rows)
+    (recording / "still.toml").write_text(tomlkit.dumps({"data": "still.npz", "rate": 100.0, "body": BRICK}))
+    done = dropspin(*arguments, cwd=recording)
+    assert_refused(done, message)
+    assert not (recording / "out").exists()

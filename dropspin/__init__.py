@@ -36,6 +36,10 @@ if TYPE_CHECKING:
     from dropspin.comparisons.engines.registry import engine_names as engine_names
     from dropspin.comparisons.judging.error_budget import ErrorBudget as ErrorBudget
     from dropspin.comparisons.judging.error_budget import error_budget as error_budget
+    from dropspin.comparisons.logs.check import log_check as log_check
+    from dropspin.comparisons.logs.log import Log as Log
+    from dropspin.comparisons.logs.log import Toss as Toss
+    from dropspin.comparisons.logs.log import load_log as load_log
     from dropspin.comparisons.measuring.contacts import contacts as contacts
     from dropspin.comparisons.measuring.metrics import METRICS as METRICS
     from dropspin.comparisons.regressions.baseline import Baseline as Baseline

@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from dropspin.comparisons.logs.flights import (
     window_size,
     without,
 )
-from dropspin.comparisons.logs.log import LENGTHS, UPRIGHT, Header, Log, Toss
+from dropspin.comparisons.logs.log import LENGTHS, UPRIGHT, Header, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression, regression
 from dropspin.comparisons.logs.rest import level_share, rests
 from dropspin.scenarios.errors import DropspinError
@@ -88,12 +89,19 @@ class Check:
     flights: Flights | None
 
 
-def log_check(log: Log) -> Check:
+def log_check(recording: Log | str | Path) -> Check:
     """What the flights and the rests of a recording say about its header.
 
+    Args:
+        recording: The recording, or what `load_log` takes.
+
+    Returns:
+        Its values with their intervals, its findings, and its tosses.
+
     Raises:
-        DropspinError: No toss has a free flight.
+        DropspinError: It cannot be loaded, or no toss has a free flight.
     """
+    log = recording if isinstance(recording, Log) else load_log(recording)
     down = np.array([0.0, -log.header.gravity, 0.0])
     acceleration = _acceleration(log, down)
     flights = flights_of(log, acceleration)

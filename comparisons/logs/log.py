@@ -165,6 +165,9 @@ def load_log(recording: str | Path) -> Log:
     Args:
         recording: The path of its header, a TOML file, or the name of one that dropspin has.
 
+    Returns:
+        The recording in SI units, y up, quaternions [x, y, z, w] from body to world.
+
     Raises:
         DropspinError: A file is absent, damaged or too large, a key or a column is wrong, or the values cannot be a recording's.
     """

@@ -21,16 +21,14 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
     Exit code: 0 no finding, 1 a finding, 2 bad input.
     """
     from dropspin.comparisons.logs.check import log_check
-    from dropspin.comparisons.logs.log import load_log
     from dropspin.comparisons.results.folder import study_folder
     from dropspin.reports.html.study import study_page
     from dropspin.reports.stories.log_check import CheckedLog
     from dropspin.reports.study_files import write_parquet, write_study
     from dropspin.reports.terminal.rows import print_json_or
 
-    log = load_log(recording)
     with study_folder(output) as folder:
-        study = CheckedLog.of(recording, log_check(log))
+        study = CheckedLog.of(recording, log_check(recording))
         document = write_study(study, folder)
         write_parquet(study, folder)
         (folder / "report.html").write_text(study_page(document), encoding="utf-8")

@@ -29,12 +29,13 @@ from dropspin.comparisons.logs.flights import (
     window_size,
     without,
 )
-from dropspin.comparisons.logs.log import LENGTHS, UPRIGHT, Header, Log, Toss, load_log
+from dropspin.comparisons.logs.log import LENGTHS, UPRIGHT, Header, Irregularity, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression, regression
 from dropspin.comparisons.logs.rest import level_share, rests
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import conjugate, length, multiply, rotate, unrotate
 from dropspin.scenarios.state import Array
+from dropspin.scenarios.text import counted
 
 ALARM = 1e-4
 """Probability of a finding where there is nothing, of each value."""
@@ -314,9 +315,7 @@ def _of_spins(flights: Flights) -> Iterator[Finding]:
 
 def _of_frames(flights: Flights) -> Iterator[Finding]:
     """Of frames that are missing or repeated, of tosses without a flight, and of what the file shows by itself."""
-    for shown in flights.log.irregularities:
-        where = f"toss {shown.toss}, frame {shown.frame}" if shown.toss else "the header"
-        yield Finding(shown.kind, f"{where}: {shown.value:.4g} (expected {shown.expected:.4g})")
+    yield from map(_of_file, flights.log.irregularities)
     absent = [toss.name for toss, flight in zip(flights.log.tosses, flights.flights, strict=True) if flight is None]
     if absent:
         yield Finding(
@@ -344,6 +343,22 @@ def _of_frames(flights: Flights) -> Iterator[Finding]:
                 f"toss {flight.toss.name}: its flight begins at frame {flight.first}",
                 ("it is held until then", "the recording begins after an impact"),
             )
+
+
+def _of_file(shown: Irregularity) -> Finding:
+    """What the file shows by itself, in words."""
+    place = f"toss {shown.toss}, frame {shown.frame}"
+    match shown.kind:
+        case "repeated":
+            rows = counted(int(shown.value), "row repeats", "rows repeat")
+            return Finding("repeated", f"{place}: {rows} the one before while the body moves", cure="leave out rows that were not measured")
+        case "gap":
+            return Finding("gap", f"{place}: {counted(int(shown.value), 'frame is', 'frames are')} missing before it, by the times")
+        case "jitter":
+            what = f"{place}: the times are uneven: a step of {1e3 * shown.value:.4g} ms, the usual one is {1e3 * shown.expected:.4g} ms"
+            return Finding("jitter", what, cure="give the time of each frame without rounding; or, if the camera is even, no t but rate")
+    what = f"the times have {shown.value:.5g} frames per second, the header has {shown.expected:.5g}"
+    return Finding("rate", what, ("the column t is wrong", "the key rate is wrong"), f"rate = {shown.value:.5g}, or no column t")
 
 
 def _values(flights: Flights) -> Iterator[Value]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAGES = [Path(__file__).parents[1] / name for name in ("examples.md", "note.md")]
+PAGES = [Path(__file__).parents[1] / name for name in ("examples.md", "measured.md", "note.md")]
 BLOCK = re.compile(r"^```python\n(?P<lines>.*?)^```\n(?:\n!\[[^]]+\]\((?P<picture>[^)]+)\)$)?", re.DOTALL | re.MULTILINE)
 
 

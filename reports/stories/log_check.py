@@ -58,7 +58,7 @@ class CheckedLog(Study):
                 Sentences(parts, numbered=True, on_terminal=False),
                 Sentences(brief, on_page=False),
                 Heading("Flights"),
-                Charts("flights", [Chart("frames of free flight", "noise / median noise of the tosses", [noise])]),
+                Charts("flights", [Chart("frames of free flight", "noise / noise of the other tosses", [noise])]),
             ],
             [Paragraph(f"{counted(len(parts), 'finding')}.")],
         )

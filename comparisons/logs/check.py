@@ -18,7 +18,6 @@ from dropspin.comparisons.logs.flights import (
     FEWEST_FRAMES,
     OFFSET,
     SURPRISING,
-    Flight,
     Flights,
     accelerations,
     falls,
@@ -111,10 +110,11 @@ def log_check(recording: Log | str | Path) -> Check:
             f"{log.origin}: no toss has {FEWEST_FRAMES} frames of free flight with one acceleration; film from the release on, and give "
             "the rate of the frames."
         )
+    drag = _drag(flights)
     found = [*_of_units(flights, down), *_of_quaternions(log, flights), *_of_spins(flights), *_of_frames(flights)]
     if not any(finding.kind in ("up", "unit", "quaternion") for finding in found):
-        found += [*_of_scale(flights), *_of_offset(flights), *_of_inertia(flights)]
-    return Check(tuple(_values(flights)), tuple(found), tuple(_tosses(flights)), flights)
+        found += [*_of_scale(flights), *_of_offset(flights), *_of_inertia(flights, drag)]
+    return Check(tuple(_values(flights, drag)), tuple(found), tuple(_tosses(flights)), flights)
 
 
 def _acceleration(log: Log, down: Array) -> Array:
@@ -219,13 +219,12 @@ def _listed(values: Array) -> str:
     return "[" + ", ".join(f"{value:.4f}" for value in values) + "]"
 
 
-def _of_inertia(flights: Flights) -> Iterator[Finding]:
+def _of_inertia(flights: Flights, drag: Regression) -> Iterator[Finding]:
     """Of ratios of moments of inertia that differ from the header's, and of drag."""
     found = flights.turning
     for name, value, wide in zip(("I_x / I_y", "I_z / I_y"), found.values, _half_widths(found), strict=True):
         if abs(value) > max(wide, 0.01):
             yield Finding("inertia", f"{name} is {math.exp(value):.3g} times that of the header", cure="[body] inertia")
-    drag = _drag(flights)
     if drag.values[-1] > _half_widths(drag)[-1]:
         yield Finding("drag", f"the speed decays at {drag.values[-1]:.2g} 1/s")
 
@@ -251,7 +250,9 @@ def _of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
     inverse = "body-to-world" if log.header.rotation == "world-to-body" else "world-to-body"
     rolled = -1 if other == "wxyz" else 1
     level, count = level_share(log)
-    turns = _restlessness(flights, flights.found)
+    inertia = log.header.body.inertia_tensor
+    is_ball = bool(np.allclose(inertia, inertia[0, 0] * np.eye(3)))  # a spin is constant then, in every reading
+    turns = _restlessness([rotor.samples.values for rotor in flights.rotations])
     for roll, turned, cure in (
         (rolled, False, f'quaternion = "{other}"'),
         (0, True, f'rotation = "{inverse}"'),
@@ -260,7 +261,8 @@ def _of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
         tosses = tuple(_read_as(toss, log.header, roll, turned) for toss in log.tosses)
         read = replace(log, tosses=tosses)
         by_name = {toss.name: toss for toss in tosses}
-        again = _restlessness(flights, [replace(flight, toss=by_name[flight.toss.name]) for flight in flights.found])
+        some = [replace(flight, toss=by_name[flight.toss.name]) for flight in flights.found[:MOST_ROTORS]] if not is_ball else []
+        again = _restlessness([rotation(flight, inertia).samples.values for flight in some]) if some else turns
         share, _ = level_share(read)
         if (count >= 3 and level < 0.7 and share > 0.9 and again < 2.0 * turns) or (again < 0.4 * turns and not share < 0.9 * level):
             where = (
@@ -270,10 +272,8 @@ def _of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
             return
 
 
-def _restlessness(flights: Flights, read: list[Flight]) -> float:
+def _restlessness(left: list[Array]) -> float:
     """How far the rotations of flights are from those of free bodies: the median of their root mean squares [rad]."""
-    inertia = flights.log.header.body.inertia_tensor
-    left = [rotation(flight, inertia).samples.values for flight in read[:MOST_ROTORS]]
     return float(np.median([np.sqrt(np.mean(values**2)) for values in left]))
 
 
@@ -361,7 +361,7 @@ def _of_file(shown: Irregularity) -> Finding:
     return Finding("rate", what, ("the column t is wrong", "the key rate is wrong"), f"rate = {shown.value:.5g}, or no column t")
 
 
-def _values(flights: Flights) -> Iterator[Value]:
+def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
     """The values that flights give, each with its interval or with what it needs."""
     header, found = flights.log.header, flights.moving
     wide = found.half_widths
@@ -379,7 +379,6 @@ def _values(flights: Flights) -> Iterator[Value]:
         low, middle, high = (math.exp(value + step) for step in (-error, 0.0, error))
         needs = None if error < USEFUL["ratio of inertia"] else "tosses of 0.3 s that spin at 8 rad/s or more, about different axes"
         yield Value(f"{name} over the header's", middle, low, high, "", needs)
-    drag = _drag(flights)
     rate, error = drag.values[-1], drag.half_widths[-1]
     yield Value("drag", rate, rate - error, rate + error, "1/s", None if error < USEFUL["drag"] else "longer flights")
     for name, noise, unit in (("position", found.noise, "m"), ("orientation", turning.noise, "rad")):

@@ -79,16 +79,15 @@ def free_rotor(inertia: Array, orientation: Array, angular_velocity: Array) -> F
     heaviest, fastest = _power_of_two(inertia), _power_of_two(angular_velocity)
     inertia, unit_spin = inertia / heaviest, angular_velocity / fastest  # so that no product leaves the range of doubles
     moments, axes = principal_axes(inertia)
-    spin = _along(axes, orientation, unit_spin)
 
     def until() -> float:
         rounding = spin_rounding(orientation, unit_spin)
         if not is_diagonal(inertia):  # the axes are rounded too
             rounding = np.full(3, EPS * float(np.linalg.norm(unit_spin)))
-        ascending = np.argsort(moments, kind="stable")
+        ascending, spin = np.argsort(moments, kind="stable"), _along(axes, orientation, unit_spin)
         return horizon(tuple(moments[ascending].tolist()), tuple(spin[ascending]), rounding[ascending]) / fastest
 
-    if all(moments[m] == moments[n] or spin[m] == 0 or spin[n] == 0 for m, n in ((0, 1), (1, 2), (2, 0))):
+    if _is_steady(moments, axes, orientation, unit_spin):
         return FreeRotor(principal_spin(orientation, angular_velocity), float(np.linalg.norm(angular_velocity)), True, until)
     top = AsymmetricTop(inertia, orientation, unit_spin)
 
@@ -97,6 +96,14 @@ def free_rotor(inertia: Array, orientation: Array, angular_velocity: Array) -> F
         return turned, rates * fastest
 
     return FreeRotor(motion, top.largest_spin * fastest, False, until)
+
+
+def _is_steady(moments: Array, axes: Array, orientation: Array, spin: Array) -> bool:
+    """Whether a spin is about a principal axis."""
+    if np.ptp(moments) == 0.0:
+        return True
+    along = _along(axes, orientation, spin)
+    return all(moments[m] == moments[n] or along[m] == 0 or along[n] == 0 for m, n in ((0, 1), (1, 2), (2, 0)))
 
 
 def _power_of_two(values: Array) -> float:

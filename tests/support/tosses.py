@@ -12,6 +12,7 @@ from dropspin.scenarios.state import Array
 from dropspin.scenarios.truths.free_rotor import free_rotor
 
 BRICK = {"shape": "box", "half_extents": [0.04, 0.05, 0.07], "mass": 0.4, "inertia": [9.9e-4, 8.7e-4, 5.5e-4]}
+CUBE = {"shape": "box", "half_extents": [0.05, 0.05, 0.05], "mass": 0.4, "inertia": [6.7e-4] * 3}
 AFTER = 12
 """Frames after the impact."""
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.tosses import BRICK, made
+from support.tosses import BRICK, CUBE, made
 
 from dropspin.comparisons.logs.check import Check, Finding, log_check
 from dropspin.comparisons.logs.log import Log, Toss, load_log
@@ -14,7 +14,6 @@ from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
 
 NOISE = (2e-4, 2e-3)
-CUBE = {"shape": "box", "half_extents": [0.05, 0.05, 0.05], "mass": 0.4, "inertia": [6.7e-4] * 3}
 ON_SIDE = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
 
 
@@ -32,7 +31,7 @@ def only(check: Check) -> Finding:
     return check.findings[0]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_sound_recording_has_no_finding(seed: int) -> None:
     assert log_check(sound(seed)).findings == ()
 
@@ -119,7 +118,7 @@ def test_the_shipped_cube_has_short_lengths_and_an_eccentric_mass() -> None:
     assert 9.579 < values["gravity"].value < 9.623
     assert 0.00438 < values["centre of mass, z"].value < 0.00673
     assert values["centre of mass, x"].low < 0.0 < values["centre of mass, x"].high
-    assert kinds["scale"].cure == "length_scale = 0.9779"
+    assert kinds["scale"].cure == "length_scale = 0.978"
     assert not kinds["centre of mass"].alternatives
     assert kinds["centre of mass"].cure.startswith("[body] center_of_mass")
 

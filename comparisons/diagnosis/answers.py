@@ -110,16 +110,17 @@ def judged(
         acting: The settings that may act on it.
     """
     unknown, causes, free = body.facts.unknown, body.causes.get(answer.question, ()), answer.physical
+    acting = tuple(name for name in acting if _acts(body, name))
     if unknown:
         differs = bool(abs(values[0] - free) > NOTEWORTHY * (100.0 if answer.unit == "%" else abs(free)))
-        return replace(answer, measured=values[0], findings=(Finding("setting", (*unknown, *causes)),) * differs)
+        return replace(answer, measured=values[0], findings=(Finding("setting", (*unknown, *acting, *causes)),) * differs)
     scale = 100.0 if answer.unit == "%" else max(abs(exact[0]), 1e-300)
     errors, limit = [value - truth for value, truth in zip(values, exact, strict=True)], math.nan
     findings: list[Finding] = []
     if all(map(math.isfinite, values)) and is_sufficient(dts):
         limit = error_budget(dts, errors, negligible=0.1 * NOTEWORTHY * scale).asymptotic_error if any(errors) else 0.0
     if (not math.isfinite(free) and math.isfinite(exact[0])) or abs(exact[0] - free) > NOTEWORTHY * scale:
-        findings.append(Finding("setting", tuple(name for name in acting if _acts(body, name))))
+        findings.append(Finding("setting", acting))
     if abs(errors[0]) > NOTEWORTHY * scale * (1.0 + 1e-6):
         vanishes = abs(errors[-1]) < 0.6 * abs(errors[0])
         findings.append(Finding("time step" if vanishes else "model", (*causes, "timestep")))
@@ -132,7 +133,7 @@ def _acts(body: LooseBody, setting: str) -> bool:
 
 
 def vector_text(axis: Array) -> str:
-    """The components of a direction with three digits, or the name of an axis of the body."""
-    if sum(map(bool, axis)) == 1:
-        return "xyz"[int(abs(axis).argmax())]
-    return f"({', '.join(f'{value:.3g}' for value in axis)})"
+    """The components of a unit vector with three decimals, or the name of the axis of the body."""
+    rounded = [round(value, 3) + 0.0 for value in axis.tolist()]
+    names = [name for name, value in zip("xyz", rounded, strict=True) if value]
+    return names[0] if len(names) == 1 else f"({', '.join(f'{value:g}' for value in rounded)})"

@@ -34,7 +34,7 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     half = math.sqrt(0.5)
     along, across = (_stops(body, dts, rests, direction) for direction in (np.array([1.0, 0.0, 0.0]), np.array([half, 0.0, half])))
     if not along or not across:
-        return [replace(blank, detail=TIPS)]
+        return [replace(blank, direction=way, detail=TIPS) for way in ("0°", "45°")]
     ways = (("0°", along), ("45°", across))
     answers = [judged(body, replace(blank, direction=way), dts, stops, [exact] * len(dts), OF_FALLS) for way, stops in ways]
     # Soft contacts take some time to carry a load that shifts: a shorter slide says more of that than of friction.

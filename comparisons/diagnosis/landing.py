@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, REBOUND, SETTLED, TIPS, UNTURNED, WATCHED, Answer, Finding
+from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, REBOUND, SETTLED, TIPS, UNTURNED, WATCHED, Answer, Finding, Kind
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.judging.error_budget import error_budget, is_sufficient
 from dropspin.scenarios.rotations import rotate, unrotate
@@ -50,7 +50,9 @@ def rebound(body: LooseBody, dts: Sequence[float], speed: float, quantity: str) 
     findings: tuple[Finding, ...] = ()
     if max(change, float(np.ptp(ratios[0]))) > NOTEWORTHY:
         stays = not math.isnan(exact) and abs(means[-1] - exact) >= 0.6 * change
-        findings = (Finding("model" if stays else "time step", (*body.causes.get("impact", ()), "timestep")),)
+        kind: Kind = "model" if stays else "time step"
+        finest = "" if math.isfinite(limit) or len(dts) < 2 else f"{means[-1]:.3g} at {1e3 * dts[-1]:.3g} ms"
+        findings = (Finding(kind, (*body.causes.get("impact", ()), "timestep"), detail=finest),)
     answer = Answer("impact", quantity, "1", speed=speed, measured=means[0], in_force=exact, limit=limit, findings=findings)
     return replace(answer, least=float(min(ratios[0])), most=float(max(ratios[0])))
 

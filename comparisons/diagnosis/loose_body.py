@@ -203,7 +203,7 @@ class Support:
         self._flat = flat[hull_corners(flat)] if len(flat) else flat
         rounded = [(one, part) for one, part, is_ in zip(corners, parts, is_round, strict=True) if is_]
         self._centres = np.concatenate([np.empty((0, 3)), *(one for one, _ in rounded)])
-        stretches = [part.shape.semi_axes[:, np.newaxis] * rotate(part.turn, AXES).T for one, part in rounded for _ in one]
+        stretches = [part.shape.semi_axes[:, np.newaxis] * rotate(part.turn, AXES) for one, part in rounded for _ in one]
         self._stretches = np.array(stretches).reshape(-1, 3, 3)
 
     def lowest(self, states: Array) -> Array:

@@ -66,11 +66,11 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
     """A finding with the changes that remove it, each with the value measured with it; the finding is then of the first one's settings."""
     found: dict[tuple[str, ...], Remedy] = {}
     for settings, step in _tries(body, answer, finding):
-        if settings in found or (len(settings) > 1 and found):
+        changes = body.changes(settings)
+        if settings in found or (len(settings) > 1 and found) or body.patch(changes, step) in {one.text for one in found.values()}:
             continue
         for other in again(settings, step):
             if not any(one.is_error == finding.is_error or body.facts.unknown for one in other.findings):
-                changes = body.changes(settings)
                 found[settings] = Remedy(body.patch(changes, step), other.measured, other.unit, *body.elsewhere(step, changes))
     if not found:
         return finding
@@ -88,8 +88,9 @@ def _tries(body: LooseBody, answer: Answer, finding: Finding) -> Iterator[tuple[
     if "timestep" in finding.settings:
         excess = abs(answer.measured - answer.in_force) / (100.0 if answer.unit == "%" else abs(answer.in_force) or 1.0) / NOTEWORTHY
         yield (), _rounded(dt * (SAFE / excess if excess > 1.0 else 0.25))
-    if len(known) > 1 and not finding.is_error:
-        yield tuple(known), dt
+    together = tuple(name for name in known if name not in body.causes.get(answer.question, ()))
+    if len(together) > 1 and not finding.is_error:
+        yield together, dt
 
 
 def _rounded(step: float) -> float:

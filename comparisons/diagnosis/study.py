@@ -149,9 +149,12 @@ def diagnose(
             path = _around_mesh(path, given, density, Path(folder))
         entries = [present_entry(engine) for engine in chosen]
         with started_crews(1, 1, entries, resources) as crews:
-            pieces = [
-                (entry, name) for entry in entries for name in _checked(given, crews[0].call(entry, _bodies, path, given, wanted, loose))
-            ]
+            read = [(entry, crews[0].call(entry, _bodies, path, given, wanted, loose)) for entry in entries]
+        refused = [one for one in read if isinstance(one[1], DropspinError)]
+        readers = [one for one in read if one not in refused] or read
+        pieces = [(entry, name) for entry, names in readers for name in _checked(given, names)]
+        names = dict.fromkeys(name for _, name in pieces)
+        refusals = [BodyDiagnosis(name, entry.label, breakdown=str(why)) for entry, why in refused for name in names]
         with started_crews(jobs, len(pieces), entries, resources) as crews:
 
             def of_body(piece: tuple[EngineEntry, str], processes: EngineProcesses, report: Callable[[str], None]) -> BodyDiagnosis:
@@ -160,7 +163,7 @@ def diagnose(
                 found = processes.call(entry, _diagnosed, path, given, name, on, Targets(restitution, friction))
                 return BodyDiagnosis(name, entry.label, breakdown=found.reason) if isinstance(found, Breakdown) else _checked(given, found)
 
-            return Diagnosis(given, tuple(results_in_parallel(pieces, of_body, crews, on_progress or ignore)))
+            return Diagnosis(given, (*refusals, *results_in_parallel(pieces, of_body, crews, on_progress or ignore)))
 
 
 def _checked(given: str, found: Found | DropspinError | Breakdown) -> Found:

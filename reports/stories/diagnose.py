@@ -108,7 +108,7 @@ def of_several(bodies: Sequence[BodyDiagnosis]) -> list[str]:
     engines, names = {body.engine for body in bodies}, {body.name for body in bodies}
     for body in bodies:
         owner = " ".join([body.name] * (len(names) > 1) + [body.engine] * (len(engines) > 1))
-        for sentence in [f"{body.breakdown}."] if body.breakdown else [*sentences(body), *_left_out(body)]:
+        for sentence in [f"{body.breakdown.removesuffix('.')}."] if body.breakdown else [*sentences(body), *_left_out(body)]:
             owners.setdefault(sentence, []).append(owner)
     return [f"{_listed(of_sentence)}: {sentence}" for sentence, of_sentence in owners.items()]
 

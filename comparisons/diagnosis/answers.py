@@ -12,7 +12,7 @@ from dropspin.scenarios.state import Array
 Kind = Literal["impossible", "changed", "time step", "setting", "model", "target"]
 NOTEWORTHY = 0.01
 """Share from which a difference is a finding."""
-WATCHED, SETTLED = 0.3, 3.0  # s
+WATCHED = 0.3  # s
 UNTURNED = 0.05  # rad
 TIPS = "tips over"
 REBOUND, COEFFICIENT = "rebound / impact speed", "coefficient of the contact"

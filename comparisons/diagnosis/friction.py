@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import OF_FALLS, TIPS, UNTURNED, WATCHED, Answer, Finding, judged
-from dropspin.comparisons.diagnosis.landing import settled, tilt
+from dropspin.comparisons.diagnosis.landing import tilt
 from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
 from dropspin.scenarios.rotations import rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
@@ -21,7 +21,7 @@ ONE_WAY = 0.05
 
 
 def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
-    """The distance in which a body that slides stops, along and at 45 degrees; and its creep on a slope that holds."""
+    """The distance in which a body that slides stops, along an axis of the surface and at 45 degrees to it."""
     facts, causes = body.facts, body.causes.get("slide", ())
     if not facts.lands or not facts.friction > 0.0:
         return []
@@ -29,7 +29,7 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     blank = Answer("slide", "stopping distance", "m", speed=SLIDE, physical=free)
     if free > LONGEST_SLIDE:
         return [replace(blank, detail=f"more than {LONGEST_SLIDE:g} m: not simulated")]
-    end = settled(body, dts[0])[-1:]
+    end = body.settled[-1:]
     rests = [body.motions(end, dt, math.ceil(WATCHED / dt), -facts.gravity * UP, floor=True)[0, -1] for dt in dts]
     half = math.sqrt(0.5)
     along, across = (_stops(body, dts, rests, direction) for direction in (np.array([1.0, 0.0, 0.0]), np.array([half, 0.0, half])))
@@ -44,7 +44,7 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     named = {setting for finding in answers[1].findings for setting in finding.settings}
     if turns and not named & {*causes, "timestep"}:
         answers[1] = replace(answers[1], findings=(*answers[1].findings, Finding("model", (*causes, "timestep"))))
-    return answers + _creep(body, dts[0])
+    return answers
 
 
 def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direction: Array) -> list[float]:
@@ -71,12 +71,14 @@ def _stop(facts: Facts) -> float:
     return float(0.5 * SLIDE * weights @ ((facts.mass + facts.armature) * v / force))
 
 
-def _creep(body: LooseBody, dt: float) -> list[Answer]:
-    """The speed of a body on a slope of half of its friction."""
-    facts = body.facts
+def creep(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
+    """The speed of a body on a slope of half of its friction, which should hold it."""
+    facts, dt = body.facts, dts[0]
+    if not facts.lands or not facts.friction > 0.0:
+        return []
     slope = math.atan(0.5 * facts.friction)
     gravity = facts.gravity * np.array([math.sin(slope), -math.cos(slope), 0.0])
-    start = settled(body, dt)[-1:]
+    start = body.settled[-1:].copy()
     start[:, VELOCITY] = start[:, SPIN] = 0.0
     states = body.motions(start, dt, math.ceil(1.0 / dt), gravity, floor=True)[0]
     answer = Answer("slide", "creep on a slope of half of the friction", "m/s", physical=0.0)
@@ -94,7 +96,7 @@ def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         return []
     radius, inertia = float(facts.colliding[0].shape.semi_axes[0]), float(facts.principal[0].mean())
     kept = []
-    end = settled(body, dts[0])[-1]
+    end = body.settled[-1]
     for dt in dts:
         start = end.copy()
         start[VELOCITY], start[SPIN] = [1.0, 0.0, 0.0], [0.0, 0.0, -1.0 / radius]

@@ -31,8 +31,10 @@ def inertia(facts: Facts) -> list[Answer]:
 def _impossible(facts: Facts, given: Array, remedies: tuple[Remedy, ...]) -> Iterator[Answer]:
     """Why no body has an inertia [kg m²], shape (3, 3), or no body of this shape and mass."""
     least, middle, largest = np.linalg.eigvalsh(given).tolist()
-    excess, quantity, whose = largest / (least + middle), "largest moment / sum of others", "any body"
-    if least > 0.0 and largest <= ROUNDING * (least + middle):
+    excess, quantity, possible = largest / (least + middle), "largest moment / sum of others", "at most 1 for any body"
+    if least <= 0.0:
+        excess, quantity, possible = least / largest, "least moment / largest", "more than 0 for any body"
+    elif largest <= ROUNDING * (least + middle):
         if not facts.parts:
             return
         squares = (0.5 * np.trace(given) * np.eye(3) - given) / facts.mass
@@ -40,9 +42,9 @@ def _impossible(facts: Facts, given: Array, remedies: tuple[Remedy, ...]) -> Ite
         if excess <= ROUNDING:
             return
         excess = factor if (factor := largest / largest_possible(facts, given)) > ROUNDING else excess
-        quantity, whose = "largest moment / largest possible", "this mass and shape"
-    finding = Finding("impossible", ("inertia",), remedies, whose)
-    yield Answer("inertia", quantity, "1", measured=excess, physical=1.0, findings=(finding,))
+        quantity, possible = "largest moment / largest possible", "at most 1 for this mass and shape"
+    finding = Finding("impossible", ("inertia",), remedies, possible)
+    yield Answer("inertia", quantity, "1", measured=excess, physical=float(least > 0.0), findings=(finding,))
 
 
 def _components(tensor: Array) -> str:

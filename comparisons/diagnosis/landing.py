@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, REBOUND, SETTLED, TIPS, UNTURNED, WATCHED, Answer, Finding, Kind
+from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, REBOUND, TIPS, UNTURNED, WATCHED, Answer, Finding, Kind
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.judging.error_budget import error_budget, is_sufficient
 from dropspin.scenarios.rotations import rotate, unrotate
@@ -86,19 +86,13 @@ def _rebounds(body: LooseBody, speed: float, dt: float, phases: int) -> tuple[Ar
     return np.array(ratios), np.array(fastest), np.array(depths), np.array(times)
 
 
-def settled(body: LooseBody, dt: float) -> Array:
-    """The states of the body that is put down in the file's pose, over three seconds, shape (n, 13)."""
-    facts = body.facts
-    return body.motions(facts.start()[np.newaxis], dt, math.ceil(SETTLED / dt), -facts.gravity * UP, floor=True)[0]
-
-
-def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
+def rest(body: LooseBody, _: Sequence[float]) -> list[Answer]:
     """The depth of the body at rest, and its speed there."""
     facts = body.facts
     if not facts.lands:
         return []
-    states = settled(body, dts[0])
-    last = states[-math.ceil(0.5 / dts[0]) :]
+    states = body.settled
+    last = states[-math.ceil(0.5 / facts.dt) :]
     heights = facts.lowest(last)
     depth = -float(heights.mean())
     size = max(float(np.linalg.norm(facts.points, axis=1).max()), 1e-12)

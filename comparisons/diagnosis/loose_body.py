@@ -12,40 +12,18 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from dropspin.comparisons.diagnosis.parts import AXES, DIRECTIONS, Part, Support, volume
 from dropspin.comparisons.diagnosis.source import Setting
-from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Mesh, Shape, Sphere
-from dropspin.scenarios.bodies.hull import hull_corners
 from dropspin.scenarios.bodies.inertia import principal_axes
-from dropspin.scenarios.bodies.mesh import is_closed
-from dropspin.scenarios.bodies.mesh_files import Faces
-from dropspin.scenarios.rotations import rotate, unrotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, Array
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import SPIN, UP, Array
 from dropspin.scenarios.truths.settings import Resistance, fall, free_motion, spin_about_axis
 
-FASTEST = 1e3  # rad/s
-AXES = np.eye(3)
+SETTLED = 3.0  # s
 STILL = np.zeros(3)
 ROUNDING = 1e-14  # of products of inertia, relative to the moments
-TURNS = np.arange(150) * math.pi * (3.0 - math.sqrt(5.0))
-HEIGHTS = 1.0 - 2.0 * (np.arange(150) + 0.5) / 150
-AROUND = np.sqrt(1.0 - HEIGHTS**2)
-DIRECTIONS = np.concatenate([np.stack([AROUND * np.cos(TURNS), HEIGHTS, AROUND * np.sin(TURNS)], axis=1), AXES, -AXES])
-"""Directions that are spread evenly, and those of the axes, shape (156, 3)."""
 Changes = Mapping[str, str | float]
 """Settings to change, by name: those of `LooseBody.remedies`."""
-
-
-class Part(NamedTuple):
-    """A geometry of the body: a solid shape of 1 kg, where its centre is relative to the centre of mass [m], and how it is turned.
-
-    One that does not collide bounds the body's inertia, and nothing else.
-    """
-
-    name: str
-    shape: Shape
-    position: Array
-    turn: Array
-    collides: bool = True
 
 
 class Drag(NamedTuple):
@@ -87,7 +65,6 @@ class Facts:
         settings: Where settings that matter are written, by the engine's names.
         ignored: What the engine read and does not use, or changes: name, what is written, what is in force.
         unmodelled: What the file has beside the body that the simulations leave out.
-        fastest: The largest spin that the engine simulates, or that is tried [rad/s].
     """
 
     name: str
@@ -117,7 +94,6 @@ class Facts:
     settings: Mapping[str, Setting]
     ignored: Sequence[tuple[str, Setting, str]]
     unmodelled: Sequence[str]
-    fastest: float = FASTEST
 
     def lowest(self, states: Array) -> Array:
         """Heights of the body's lowest point at states, shape (n,) [m]."""
@@ -126,7 +102,7 @@ class Facts:
     @property
     def lands(self) -> bool:
         """Whether there is a surface that gravity holds the body on."""
-        return bool(self.surface) and self.gravity > 0.0
+        return bool(self.surface) and self.gravity * (1.0 - self.lifted) > 0.0
 
     @cached_property
     def _support(self) -> "Support":
@@ -193,42 +169,6 @@ class Facts:
         return found
 
 
-class Support:
-    """The lowest points of geometries together: of the corners of all that have flat faces, and of the ellipsoids about other corners."""
-
-    def __init__(self, parts: Sequence[Part]) -> None:
-        corners = [part.position + rotate(part.turn, part.shape.hull) for part in parts]
-        is_round = [bool(part.shape.semi_axes.any()) for part in parts]
-        flat = np.concatenate([np.empty((0, 3)), *(one for one, rounded in zip(corners, is_round, strict=True) if not rounded)])
-        self._flat = flat[hull_corners(flat)] if len(flat) else flat
-        rounded = [(one, part) for one, part, is_ in zip(corners, parts, is_round, strict=True) if is_]
-        self._centres = np.concatenate([np.empty((0, 3)), *(one for one, _ in rounded)])
-        stretches = [part.shape.semi_axes[:, np.newaxis] * rotate(part.turn, AXES) for one, part in rounded for _ in one]
-        self._stretches = np.array(stretches).reshape(-1, 3, 3)
-
-    def lowest(self, states: Array) -> Array:
-        """Heights of the lowest point at states, shape (n,) [m]."""
-        up = unrotate(states[:, ORIENTATION], np.broadcast_to(UP, (len(states), 3)))
-        depths = np.linalg.norm(np.einsum("kij,nj->nki", self._stretches, up), axis=-1)
-        heights = np.concatenate([up @ self._flat.T, up @ self._centres.T - depths], axis=1)
-        found: Array = states[:, POSITION][:, 1] + heights.min(axis=1)
-        return found
-
-
-def volume(shape: Shape) -> float:
-    """Volume of a shape [m³]; NaN of a mesh that is not closed."""
-    if isinstance(shape, Sphere):
-        return 4.0 / 3.0 * math.pi * shape.radius**3
-    if isinstance(shape, Cylinder | Capsule):
-        caps = 4.0 / 3.0 * math.pi * shape.radius**3 if isinstance(shape, Capsule) else 0.0
-        return 2.0 * math.pi * shape.radius**2 * shape.half_length + caps
-    if isinstance(shape, Box | Ellipsoid):
-        return (8.0 if isinstance(shape, Box) else 4.0 / 3.0 * math.pi) * math.prod(shape.half_extents)
-    if isinstance(shape, Mesh) and shape.inertia == "solid":
-        return abs(shape.content)
-    return math.nan
-
-
 class LooseBody(ABC):
     """A body of a user's model that can be simulated alone, in the process of its engine.
 
@@ -260,6 +200,13 @@ class LooseBody(ABC):
         return {name: value for setting in settings for name, value in self.remedies[setting].items()}
 
     @cached_property
+    def settled(self) -> Array:
+        """The states of the body that is put down in the file's pose, over three seconds at the file's time step, shape (n, 13)."""
+        dt, weight = self.facts.dt, -self.facts.gravity * UP
+        found: Array = self.motions(self.facts.start()[np.newaxis], dt, math.ceil(SETTLED / dt), weight, floor=True)[0]
+        return found
+
+    @cached_property
     def _tried(self) -> dict[tuple[str, ...], "LooseBody"]:
         return {}
 
@@ -270,6 +217,11 @@ class LooseBody(ABC):
     @abstractmethod
     def for_restitution(self, restitution: float, dt: float) -> Changes:
         """The changes that give a coefficient of restitution at a time step [s], those of `dropspin calibrate`."""
+
+    @property
+    def likeness(self) -> tuple[object, ...]:
+        """Something that equal bodies have in common, which have the same answers; empty if that is not known."""
+        return ()
 
     def elsewhere(self, dt: float, changes: Changes) -> tuple[int, bool]:
         """The number of other bodies that changes apply to as well, and whether the whole model runs with them."""
@@ -292,9 +244,3 @@ class LooseBody(ABC):
         Raises:
             Diverged: The simulation broke down.
         """
-
-
-def mesh_shape(points: Array, faces: Faces) -> Shape:
-    """A mesh as a solid, or as a surface if it is not closed."""
-    inertia = "solid" if is_closed(points, faces) else "surface"
-    return Mesh.model_validate({"shape": "mesh", "points": points, "faces": faces, "mass": 1.0, "inertia": inertia})

@@ -110,9 +110,9 @@ class MuJoCoAlone:
                 moments[largest] = min(moments[largest], np.nextafter(moments.sum() - moments[largest], 0.0))
                 new.explicitinertial, new.mass, new.inertia = True, old.body_mass[body], moments
                 new.ipos, new.iquat = old.body_ipos[body], old.body_iquat[body]
-            for geom in self.geoms:
+            for number, geom in enumerate(self.geoms):
                 if old.geom_bodyid[geom] == body:
-                    new.add_geom(mass=0.0, name=f"own {geom}", contype=0, conaffinity=0, **self._geom(spec, geom))
+                    new.add_geom(mass=0.0, name=f"own {number}", contype=0, conaffinity=0, **self._geom(spec, geom))
 
     @property
     def damping(self) -> Array:
@@ -136,9 +136,10 @@ class MuJoCoAlone:
         if old.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
             return found
         points, faces = mesh_of(old, geom)
-        mesh = spec.add_mesh(name=f"mesh {geom}", uservert=points.ravel(), userface=faces.ravel())
+        name = f"mesh {self.geoms.index(geom)}" if geom in self.geoms else "mesh"
+        mesh = spec.add_mesh(name=name, uservert=points.ravel(), userface=faces.ravel())
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-        return found | {"meshname": f"mesh {geom}"}
+        return found | {"meshname": name}
 
     def _add_surface(self, spec: Any) -> None:
         """What the body lands on, level and with its top at y = 0, and the contact pairs."""
@@ -149,7 +150,7 @@ class MuJoCoAlone:
         at = {"pos": -top * UP, "quat": np.roll(turn, 1)}
         spec.worldbody.add_geom(name="surface", contype=0, conaffinity=0, **self._geom(spec, self.surface) | at)
         for geom, pair in self.pairs.items():
-            spec.add_pair(geomname1="surface", geomname2=f"own {geom}", **self._in_force(pair))
+            spec.add_pair(geomname1="surface", geomname2=f"own {self.geoms.index(geom)}", **self._in_force(pair))
 
     def _in_force(self, pair: Mapping[str, Any]) -> dict[str, Any]:
         """The settings of a contact, with the time constant that MuJoCo raises to two of the file's steps."""

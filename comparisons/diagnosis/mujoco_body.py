@@ -8,11 +8,12 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, Part, Support
+from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_file import ENUMERATIONS, GEOM, OPTIONS, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
+from dropspin.comparisons.diagnosis.parts import Part, Support
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.mujoco_model import contact
 from dropspin.comparisons.engines.mujoco_simulation import FULL_STATE, quiet
@@ -86,6 +87,15 @@ class MuJoCoBody(LooseBody):
         floor = Floor(restitution=max(restitution, LEAST_OF_A_SPRING) if is_rk4 else restitution, friction=0.0)
         settings = contact(floor, dt, spring_steps=SPRING_STEPS if is_rk4 else 0.0)
         return {name: " ".join(f"{value:.6g}" for value in settings[name]) for name in ("solref", "solimp")}
+
+    @property
+    def likeness(self) -> tuple[object, ...]:
+        model = self._alone.model(self.facts.dt, np.zeros(3), floor=bool(self.facts.surface))
+        stored = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+        mujoco.mj_saveModel(model, None, stored)
+        element = self._text.element
+        words = [] if element is None else [one.words for one in (*element.children, element)]
+        return stored.tobytes(), self.facts.pose.tobytes(), self.facts.surface, *self.facts.unmodelled, *words
 
     def elsewhere(self, dt: float, changes: Changes) -> tuple[int, bool]:
         is_global = dt != self.facts.dt or any(name in OPTIONS for name in changes)
@@ -183,8 +193,7 @@ class MuJoCoBody(LooseBody):
         shape, shift, turned = shape_of(model, number)
         turn = quaternion(data.geom_xmat[number])
         position = data.geom_xpos[number] - self._offset + rotate(turn, shift)
-        geom = int(model.geom(number).name.split()[1])
-        pairs = self._alone.pairs
+        geom, pairs = self._alone.geoms[int(model.geom(number).name.split()[1])], self._alone.pairs
         return Part(self._names[geom], shape, position, multiply(turn, turned), not pairs or geom in pairs)
 
     @cached_property

@@ -5,7 +5,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from dropspin.comparisons.diagnosis.loose_body import mesh_shape
+from dropspin.comparisons.diagnosis.parts import mesh_shape
 from dropspin.comparisons.engines.mujoco_model import UPWARD
 from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from dropspin.scenarios.state import Array

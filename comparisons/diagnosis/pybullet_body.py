@@ -15,7 +15,8 @@ import numpy as np
 import pybullet_data  # type: ignore[import-untyped]
 
 from dropspin.comparisons.diagnosis.inertia import inertia
-from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, Part, Support
+from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody
+from dropspin.comparisons.diagnosis.parts import Part, Support
 from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Ignored, read_links
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.source import Setting
@@ -50,8 +51,6 @@ CALLS = {
     "own restitution": "changeDynamics(body, -1, restitution={:g})",
 }
 """What to call for changes of settings."""
-FASTEST = 100.0
-"""Bullet's maxJointVelocity, to which it clamps the components of velocity and spin [m/s, rad/s]."""
 WRITTEN = (
     ("lateral_friction", "value", "friction"),
     ("restitution", "value", "restitution"),
@@ -203,7 +202,6 @@ class PyBulletBody(LooseBody):
             settings=self._settings(),
             ignored=self._ignored(plane[5]),
             unmodelled=["joints"] if len(self._model.heads) > 1 else [],
-            fastest=FASTEST,
         )
         if not parts or any(answer.findings for answer in inertia(facts)):
             parts = [*parts, *(part for link in self._links for part in link.visual_parts(self._model, centre))]

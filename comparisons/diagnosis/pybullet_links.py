@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.loose_body import Part, mesh_shape
+from dropspin.comparisons.diagnosis.parts import Part, mesh_shape
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.source import Element, Setting
 from dropspin.comparisons.diagnosis.urdf_file import UrdfFile

@@ -3,14 +3,14 @@
 import math
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Protocol, TypeVar
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, Answer, Finding
-from dropspin.comparisons.diagnosis.flight import fall, spin, tumble
-from dropspin.comparisons.diagnosis.friction import roll, slide
+from dropspin.comparisons.diagnosis.flight import fall, spin, tumble, worst_tumble
+from dropspin.comparisons.diagnosis.friction import creep, roll, slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
@@ -30,7 +30,7 @@ READERS = {".xml": ("mujoco",), ".mjcf": ("mujoco",), ".urdf": ("mujoco", "pybul
 MESH = """<mujoco><asset><mesh name="mesh" file="{path}"/></asset><worldbody><geom type="plane" size="0 0 1"/>
 <body name="{name}"><freejoint/><geom type="mesh" mesh="mesh" density="{density:g}"/></body></worldbody></mujoco>"""
 Found = TypeVar("Found")
-QUESTIONS: tuple[Question, ...] = (fall, spin, tumble, impact, rest, slide, roll)
+QUESTIONS: tuple[Question, ...] = (fall, spin, tumble, worst_tumble, impact, rest, slide, creep, roll)
 
 
 class ModelFile(Protocol):
@@ -195,6 +195,12 @@ def _file(engine: str, path: Path, given: str) -> ModelFile:
     return PyBulletModel(path, given)
 
 
+@lru_cache(maxsize=1)
+def _known(*_: object) -> dict[tuple[object, ...], BodyDiagnosis]:
+    """The diagnoses of bodies of a model in this process, by what equal bodies have in common."""
+    return {}
+
+
 def _bodies(entry: EngineEntry, path: Path, given: str, wanted: Sequence[str], loose: bool) -> list[str] | DropspinError:
     """The names of the bodies to diagnose; runs in the engine's process."""
     try:
@@ -205,16 +211,20 @@ def _bodies(entry: EngineEntry, path: Path, given: str, wanted: Sequence[str], l
 
 def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | None, targets: Targets) -> BodyDiagnosis | DropspinError:
     """The diagnosis of a body; runs in the engine's process."""
+    given_to = (entry.adapter.name, path, given)
     try:
-        body = _file(entry.adapter.name, path, given).body(name, on)
+        body = _file(*given_to).body(name, on)
     except DropspinError as error:
         return DropspinError(str(error))
-    facts = body.facts
+    facts, known = body.facts, _known(*given_to, on, targets)
+    key = body.likeness
+    if key in known:
+        return replace(known[key], name=name)
     answers = inertia(facts) + [answer for question in QUESTIONS for answer in answers_to(question, body)]
     if facts.surface:
         answers.append(Answer("friction", COEFFICIENT, "1", measured=facts.friction))
     answers += [Answer("file", key, "", findings=(Finding("changed", (key,), detail=made),)) for key, _, made in facts.ignored]
-    return BodyDiagnosis(
+    found = BodyDiagnosis(
         name=name,
         engine=facts.engine,
         version=facts.version,
@@ -228,3 +238,6 @@ def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | 
         settings={**facts.settings, **{key: setting for key, setting, _ in facts.ignored}},
         unmodelled=tuple(facts.unmodelled),
     )
+    if key:
+        known[key] = found
+    return found

@@ -56,17 +56,18 @@ class Diagnosed(Study):
     def document(self) -> Document:
         """The answers of one body, or a table of several; what differs between engines; and the findings."""
         bodies, parts = self.diagnosis.bodies, list[Part]()
-        by_name = grouped(bodies, lambda body: body.name)
+        by_name, measured = grouped(bodies, lambda body: body.name), [body for body in bodies if not body.breakdown]
         parts.append(Paragraph(COLUMNS, on_terminal=False))
         if len(by_name) > 1:
             parts.append(Table([_overview(body) for body in bodies], ["mass", "lands on"]))
         for of_name in by_name.values():
             for body in of_name:
-                parts += _body_parts(body, on_terminal=len(bodies) == 1)
-            if len(of_name) > 1:
+                parts += _body_parts(body, on_terminal=len(measured) <= 1)
+            both = [body for body in of_name if body in measured]
+            if len(both) > 1:
                 is_alone = len(by_name) == 1
-                parts += [Heading(f"{of_name[0].name}: the engines differ"), Table(differences(of_name), on_terminal=is_alone)]
-        if len(bodies) > 1:
+                parts += [Heading(f"{both[0].name}: the engines differ"), Table(differences(both), on_terminal=is_alone)]
+        if len(measured) > 1:
             parts.append(Sentences(of_several(bodies), on_page=False))
         return Document(f"Diagnosis of {self.diagnosis.file}", parts, [Paragraph(summary(self.diagnosis))])
 
@@ -82,7 +83,7 @@ def _finding_cells(body: BodyDiagnosis, answer: Answer, finding: Finding | None)
 def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
     """What a page says of a body; a terminal that shows a table of several bodies does not show it."""
     if body.breakdown:
-        return [Paragraph(f"{body.name}: {body.breakdown}.", style="bold", on_terminal=on_terminal)]
+        return [Paragraph(f"{body.name}: {body.breakdown.removesuffix('.')}.", style="bold", on_terminal=on_terminal)]
     others = f" (or {_listed(body.others)}, by --on)" if body.others else ""
     lands = f"; lands on {body.surface}{others}, friction {body.friction:g}" if body.surface else "; lands on nothing"
     what = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg"
@@ -230,9 +231,9 @@ def _statement(found: tuple[Answer, Finding]) -> str:
     answer, finding = found
     measured, in_force, physical = _cells(answer)
     if finding.kind == "impossible":
-        return f"is {measured}, but at most 1 for {finding.detail}"
+        return f"is {measured}, but {finding.detail}"
     if finding.detail:
-        return f"{measured} ({finding.detail})" if measured else finding.detail
+        return f"is {measured}, {finding.detail}" if measured else finding.detail
     wanted = in_force if finding.is_error and in_force else physical
     limit = f", {_value(answer.limit, answer.unit)} as dt → 0" if finding.kind == "time step" and math.isfinite(answer.limit) else ""
     return f"is {measured}" + (f" instead of {wanted}" if wanted else "") + limit

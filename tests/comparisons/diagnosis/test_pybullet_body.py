@@ -70,7 +70,7 @@ def test_the_default_damping_slows_fall_and_spin_as_the_closed_forms_say(tmp_pat
     for answer in spin(block, DTS):
         assert answer.limit == pytest.approx(0.6901699363194228, rel=1e-6)
         assert (answer.findings[0].kind, answer.findings[0].settings) == ("setting", ("damping",))
-    [of_tumble] = tumble(block, DTS)
+    [of_tumble, _] = tumble(block, DTS)
     assert of_tumble.limit == pytest.approx(of_tumble.in_force, rel=1e-5)
     end = block.motions(block.facts.start()[np.newaxis], 0.01, 1000, -9.81 * UP, floor=False)[0, -1]
     assert -end[VELOCITY][1] == pytest.approx(terminal.in_force, rel=1e-4)
@@ -110,7 +110,7 @@ def test_links_that_are_fixed_to_each_other_are_one_body(tmp_path):
         errors.append([np.abs(momentum(end) - momentum(start)).max(), np.abs(end[VELOCITY] - start[VELOCITY]).max()])
     assert np.log2(np.array(errors[0]) / errors[1]) == pytest.approx([1.0, 1.0], abs=0.2)
     assert np.max(errors) < 0.01 * np.linalg.norm(momentum(start))
-    [of_tumble] = tumble(both, DTS)
+    [of_tumble, _] = tumble(both, DTS)
     assert of_tumble.limit == pytest.approx(of_tumble.in_force, rel=1e-4)
     assert fall(both, DTS)[0].limit == pytest.approx(4.558187518993211, rel=1e-6)
     for answer in spin(both, DTS):

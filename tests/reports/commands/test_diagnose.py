@@ -98,3 +98,14 @@ def test_mesh_is_a_solid_of_a_density(tmp_path):
     assert done.returncode == 0, done.stderr
     moments = [row["measured"] for row in json.loads(done.stdout) if row["unit"] == "kg m²"]
     assert sorted(moments) == pytest.approx([0.0125, 0.025, 0.0325], rel=1e-4)
+
+
+def test_urdf_that_one_engine_refuses_is_diagnosed_in_the_other(tmp_path):
+    pytest.importorskip("pybullet", exc_type=ImportError)
+    text = (DOCS / "diagnose/brick.urdf").read_text(encoding="utf-8")
+    (tmp_path / "brick.urdf").write_text(text.replace('ixy="0"', ""))
+    done = dropspin("diagnose", "brick.urdf", cwd=tmp_path, COLUMNS="200")
+    assert done.returncode == 1, done.stderr  # an inertia is impossible
+    refused, measured, *_ = done.stdout.splitlines()
+    assert "MuJoCo does not compile it: XML Error: required attribute missing: 'ixy'" in refused
+    assert measured.startswith("brick: box, 2 kg; PyBullet")

@@ -1,0 +1,76 @@
+"""The geometries of a body: solid shapes, their lowest points and volumes."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Mesh, Shape, Sphere
+from dropspin.scenarios.bodies.hull import hull_corners
+from dropspin.scenarios.bodies.mesh import is_closed
+from dropspin.scenarios.bodies.mesh_files import Faces
+from dropspin.scenarios.rotations import rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, UP, Array
+
+AXES = np.eye(3)
+TURNS = np.arange(150) * math.pi * (3.0 - math.sqrt(5.0))
+HEIGHTS = 1.0 - 2.0 * (np.arange(150) + 0.5) / 150
+AROUND = np.sqrt(1.0 - HEIGHTS**2)
+DIRECTIONS = np.concatenate([np.stack([AROUND * np.cos(TURNS), HEIGHTS, AROUND * np.sin(TURNS)], axis=1), AXES, -AXES])
+"""Directions that are spread evenly, and those of the axes, shape (156, 3)."""
+
+
+class Part(NamedTuple):
+    """A geometry of the body: a solid shape of 1 kg, where its centre is relative to the centre of mass [m], and how it is turned.
+
+    One that does not collide bounds the body's inertia, and nothing else.
+    """
+
+    name: str
+    shape: Shape
+    position: Array
+    turn: Array
+    collides: bool = True
+
+
+class Support:
+    """The lowest points of geometries together: of the corners of all that have flat faces, and of the ellipsoids about other corners."""
+
+    def __init__(self, parts: Sequence[Part]) -> None:
+        corners = [part.position + rotate(part.turn, part.shape.hull) for part in parts]
+        is_round = [bool(part.shape.semi_axes.any()) for part in parts]
+        flat = np.concatenate([np.empty((0, 3)), *(one for one, rounded in zip(corners, is_round, strict=True) if not rounded)])
+        self._flat = flat[hull_corners(flat)] if len(flat) else flat
+        rounded = [(one, part) for one, part, is_ in zip(corners, parts, is_round, strict=True) if is_]
+        self._centres = np.concatenate([np.empty((0, 3)), *(one for one, _ in rounded)])
+        stretches = [part.shape.semi_axes[:, np.newaxis] * rotate(part.turn, AXES) for one, part in rounded for _ in one]
+        self._stretches = np.array(stretches).reshape(-1, 3, 3)
+
+    def lowest(self, states: Array) -> Array:
+        """Heights of the lowest point at states, shape (n,) [m]."""
+        up = unrotate(states[:, ORIENTATION], np.broadcast_to(UP, (len(states), 3)))
+        depths = np.linalg.norm(np.einsum("kij,nj->nki", self._stretches, up), axis=-1)
+        heights = np.concatenate([up @ self._flat.T, up @ self._centres.T - depths], axis=1)
+        found: Array = states[:, POSITION][:, 1] + heights.min(axis=1)
+        return found
+
+
+def volume(shape: Shape) -> float:
+    """Volume of a shape [m³]; NaN of a mesh that is not closed."""
+    if isinstance(shape, Sphere):
+        return 4.0 / 3.0 * math.pi * shape.radius**3
+    if isinstance(shape, Cylinder | Capsule):
+        caps = 4.0 / 3.0 * math.pi * shape.radius**3 if isinstance(shape, Capsule) else 0.0
+        return 2.0 * math.pi * shape.radius**2 * shape.half_length + caps
+    if isinstance(shape, Box | Ellipsoid):
+        return (8.0 if isinstance(shape, Box) else 4.0 / 3.0 * math.pi) * math.prod(shape.half_extents)
+    if isinstance(shape, Mesh) and shape.inertia == "solid":
+        return abs(shape.content)
+    return math.nan
+
+
+def mesh_shape(points: Array, faces: Faces) -> Shape:
+    """A mesh as a solid, or as a surface if it is not closed."""
+    inertia = "solid" if is_closed(points, faces) else "surface"
+    return Mesh.model_validate({"shape": "mesh", "points": points, "faces": faces, "mass": 1.0, "inertia": inertia})

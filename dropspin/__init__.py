@@ -37,6 +37,10 @@ if TYPE_CHECKING:
     from dropspin.comparisons.judging.error_budget import ErrorBudget as ErrorBudget
     from dropspin.comparisons.judging.error_budget import error_budget as error_budget
     from dropspin.comparisons.logs.check import log_check as log_check
+    from dropspin.comparisons.logs.compare import LogComparison as LogComparison
+    from dropspin.comparisons.logs.compare import log_compare as log_compare
+    from dropspin.comparisons.logs.fit import LogFit as LogFit
+    from dropspin.comparisons.logs.fit import log_fit as log_fit
     from dropspin.comparisons.logs.log import Log as Log
     from dropspin.comparisons.logs.log import Toss as Toss
     from dropspin.comparisons.logs.log import load_log as load_log

@@ -273,8 +273,11 @@ class Start:
 
     def drawn(self, random: np.random.Generator, count: int) -> Array:
         """States from its distribution, shape (count, 13)."""
-        steps = random.multivariate_normal(np.zeros(12), self.covariance, count, method="eigh")
-        states = np.tile(self.state, (count, 1))
+        return self.moved(random.multivariate_normal(np.zeros(12), self.covariance, count, method="eigh"))
+
+    def moved(self, steps: Array) -> Array:
+        """States that differ from its own by steps in the order of the covariance, shape (count, 12): (count, 13)."""
+        states = np.tile(self.state, (len(steps), 1))
         states[:, POSITION] += steps[:, 0:3]
         states[:, ORIENTATION] = [multiply(_turned(step), self.state[ORIENTATION]) for step in steps[:, 3:6]]
         states[:, VELOCITY] += steps[:, 6:9]

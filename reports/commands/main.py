@@ -24,6 +24,8 @@ GROUPS = {
     },
     "Compare with a recording": {
         "log check": "Check a recording of tosses by their free flight.",
+        "log fit": "Find friction and restitution of measured tosses.",
+        "log compare": "Compare engines with measured tosses.",
     },
     "Judge": {
         "check": "Check a run against the expectations of its scenes and a baseline.",

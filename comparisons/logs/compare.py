@@ -1,0 +1,279 @@
+"""Engines compared with measured tosses, each from the state at the end of its flight: errors, what they come from, and which differ.
+
+An error is a mean over tosses with a 95 % interval, beside its noise floor: the difference between the engine's motions from that state and
+from states drawn from its covariance. The parts of an error are found by improving one thing after another, so that they sum up to it: the
+centre of mass, friction and restitution, the time step; then the noise floor, and what remains.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
+from pathlib import Path
+
+import numpy as np
+
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.logs.errors import KINDS, Kind, body_length, errors
+from dropspin.comparisons.logs.fit import LogFit
+from dropspin.comparisons.logs.flights import OFFSET, Flights, Start
+from dropspin.comparisons.logs.intervals import groups, interval_of_share, intervals_of_means
+from dropspin.comparisons.logs.log import Header, Log
+from dropspin.comparisons.logs.replay import (
+    Launches,
+    flights_in,
+    launches,
+    poses,
+    recorded,
+    scene_of,
+    time_step,
+    tracked,
+    tracked_from_centre,
+    usable,
+)
+from dropspin.comparisons.running.entries import engine_entries
+from dropspin.comparisons.running.inputs import EngineEntry, ignore
+from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.state import Array
+from dropspin.scenarios.variations import with_values
+
+ENGINES = ("mujoco", "mujoco[profile=default]", "pybullet[profile=default]", "wang[contact=sequential,law=coulomb]")
+DRAWS = 4
+"""States drawn for the noise floor of each toss."""
+SEED = 48
+COMPARED = tuple(kind for kind in KINDS if kind.at == "mean" and kind.quantity in ("position", "orientation"))
+"""The errors that are compared between engines and split."""
+
+
+@dataclass(frozen=True)
+class Error:
+    """A mean error of an engine over the tosses, with its 95 % interval and its noise floor."""
+
+    engine: str
+    quantity: str
+    at: str
+    unit: str
+    value: float
+    noise_floor: float
+    lower: float
+    upper: float
+    tosses: int
+
+
+@dataclass(frozen=True)
+class Pair:
+    """The difference of the mean errors of two engines, first - second, with an interval that holds for all pairs at once."""
+
+    quantity: str
+    first: str
+    second: str
+    difference: float
+    lower: float
+    upper: float
+
+    @property
+    def differs(self) -> bool:
+        """Whether the tosses tell the two apart."""
+        return self.lower > 0.0 or self.upper < 0.0
+
+
+@dataclass(frozen=True)
+class Share:
+    """A part of an engine's mean error over the motion, with its 95 % interval."""
+
+    engine: str
+    quantity: str
+    part: str
+    value: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class LogComparison:
+    """Engines compared with a recording.
+
+    Attributes:
+        tosses: Number of tosses.
+        length: The largest extent of the body along an axis of its frame [m], in which errors of position are given.
+        dt: Time step of the engines [s].
+        errors: The errors of each engine.
+        pairs: The differences between engines.
+        groups: By quantity, the largest groups of engines that the tosses do not tell apart; an engine may be in several.
+        parts: The parts of the errors.
+        left_out: By engine, why it has no errors.
+    """
+
+    tosses: int
+    length: float
+    dt: float
+    errors: tuple[Error, ...]
+    pairs: tuple[Pair, ...]
+    groups: Mapping[str, tuple[tuple[str, ...], ...]]
+    parts: tuple[Share, ...]
+    left_out: Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """What an engine continues: launches in a scene with a time step [s], and the header that says where the tracked point is."""
+
+    what: str
+    header: Header
+    scene: Scenario
+    launched: Launches
+    dt: float
+
+
+def log_compare(
+    recording: Flights | Log | str | Path,
+    engines: Engine | str | Iterable[Engine | str] = (),
+    fit: LogFit | None = None,
+    *,
+    on_progress: Callable[[str, float], None] | None = None,
+    resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
+    jobs: int | None = None,
+) -> LogComparison:
+    """Compare engines with the tosses of a recording.
+
+    Args:
+        recording: A recording, the path of its header, or the flights found in it.
+        engines: One engine or several: engines, or names with options.
+        fit: Friction and restitution by engine, to find their part of an error.
+        on_progress: Called with a description of the current work and the fraction of the engines that are done.
+        resources: The processor time [s] and memory [bytes] that each piece of work may use.
+        jobs: Number of engines at a time; by default, the number of processors that this process may use. It changes no result.
+
+    Returns:
+        The errors, differences, groups and parts of the errors.
+
+    Raises:
+        DropspinError: The recording has no floor, or too few tosses with frames after a flight.
+    """
+    entries, flights = engine_entries(engines, ENGINES), flights_in(recording)
+    header = flights.log.header
+    starts = usable(flights)
+    measured, dt = recorded(starts), time_step(starts)
+    given = {entry.label: _given(flights, starts, dt, fit, entry.label) for entry in entries}
+
+    def all_errors(entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> dict[str, Array] | Breakdown:
+        return _errors(entry, given[entry.label], measured, processes, report)
+
+    with started_crews(jobs, len(entries), entries, resources) as crews:
+        results = results_in_parallel(entries, all_errors, crews, on_progress or ignore)
+    found = {entry.label: result for entry, result in zip(entries, results, strict=True) if not isinstance(result, Breakdown)}
+    left_out = {entry.label: result.reason for entry, result in zip(entries, results, strict=True) if isinstance(result, Breakdown)}
+    pairs = [pair for number, kind in enumerate(KINDS) if kind in COMPARED for pair in _pairs(kind, number, found)]
+    return LogComparison(
+        len(starts),
+        body_length(header.body),
+        dt,
+        tuple(error for label, by_what in found.items() for error in _rows(label, by_what)),
+        tuple(pairs),
+        {
+            kind.quantity: groups(
+                list(found), {frozenset((one.first, one.second)) for one in pairs if one.quantity == kind.quantity and one.differs}
+            )
+            for kind in COMPARED
+        },
+        tuple(share for label, by_what in found.items() for share in _shares(label, by_what)),
+        left_out,
+    )
+
+
+def _given(flights: Flights, starts: Sequence[Start], dt: float, fit: LogFit | None, label: str) -> list[_Given]:
+    """What an engine continues: as given, from drawn starts, and with one thing after another improved."""
+    header, scene = flights.log.header, scene_of(flights.log.header)
+    states, random = np.array([start.state for start in starts]), np.random.default_rng(SEED)
+    drawn = np.concatenate([start.drawn(random, DRAWS) for start in starts])
+    found = [
+        _Given("as given", header, scene, launches(scene, starts, states, dt), dt),
+        _Given("drawn starts", header, scene, launches(scene, [start for start in starts for _ in range(DRAWS)], drawn, dt), dt),
+    ]
+    centre = np.array(header.tracked_point) - flights.moving.values[OFFSET]
+    keys = {"center_of_mass": tuple(centre.tolist()), "inertia": header.body.inertia_tensor.tolist()}
+    header = header.model_copy(update={"body": type(header.body).model_validate(header.body.model_dump() | keys)})
+    scene, moved = scene_of(header), replace(flights, log=replace(flights.log, header=header))
+    states = np.array([start.state for start in usable(moved)])
+    found.append(_Given("centre of mass", header, scene, launches(scene, starts, states, dt), dt))
+    fitted = {one.parameter: one.value for one in fit.estimates if one.engine == label} if fit is not None else {}
+    if fitted:
+        scene = with_values(scene, "floor", **fitted)
+        found.append(_Given("friction and restitution", header, scene, launches(scene, starts, states, dt), dt))
+    found.append(_Given("time step", header, scene, launches(scene, starts, states, 0.5 * dt), 0.5 * dt))
+    return found
+
+
+def _errors(
+    entry: EngineEntry, given: Sequence[_Given], measured: Array, processes: EngineProcesses, report: Callable[[str], None]
+) -> dict[str, Array] | Breakdown:
+    """The errors of each toss by what was given, shape (m, kinds); those of drawn starts are differences from the motion as given."""
+    found: dict[str, Array] = {}
+    nominal = measured
+    for one in given:
+        report(f"{entry.label}, {one.what}")
+        result = processes.call(entry, poses, [one.scene], one.launched, one.dt)
+        if isinstance(result, Breakdown):
+            if one.what == "as given":
+                return result
+            found[one.what] = np.full((len(measured), len(KINDS)), np.nan)
+            continue
+        seen, header = tracked(one.header, result[0]), given[0].header
+        t = one.launched.frames - one.launched.frames[:, :1]
+        reference = np.repeat(nominal, DRAWS, axis=0) if one.what == "drawn starts" else measured
+        of_each = errors(header.body, header.gravity, tracked_from_centre(header), t, reference, seen)
+        if one.what == "as given":
+            nominal = seen
+        found[one.what] = of_each.reshape(len(measured), -1, len(KINDS)).mean(axis=1)
+    return found
+
+
+def _rows(label: str, found: Mapping[str, Array]) -> list[Error]:
+    """The errors of an engine as given."""
+    values, floor = found["as given"], found["drawn starts"]
+    lower, upper = intervals_of_means(values)
+    rows = []
+    for number, kind in enumerate(KINDS):
+        low, high = interval_of_share(values[:, number]) if kind.quantity == "resting face" else (lower[number], upper[number])
+        value, noise = _mean(values[:, number]), _mean(floor[:, number])
+        tosses = int(np.isfinite(values[:, number]).sum())
+        rows.append(Error(label, kind.quantity, kind.at, kind.unit, value, noise, float(low), float(high), tosses))
+    return rows
+
+
+def _mean(values: Array) -> float:
+    """The mean of the finite values; NaN without one."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else math.nan
+
+
+def _pairs(kind: Kind, number: int, found: Mapping[str, Mapping[str, Array]]) -> list[Pair]:
+    """The differences of all pairs of engines, on the tosses that all have."""
+    names = list(combinations(found, 2))
+    if not names:
+        return []
+    differences = np.stack([found[one]["as given"][:, number] - found[other]["as given"][:, number] for one, other in names], axis=1)
+    lower, upper = intervals_of_means(differences, simultaneous=True)
+    return [
+        Pair(kind.quantity, *pair, float(differences[:, column].mean()), float(lower[column]), float(upper[column]))
+        for column, pair in enumerate(names)
+    ]
+
+
+def _shares(label: str, found: Mapping[str, Array]) -> list[Share]:
+    """The parts of an engine's errors over the motion."""
+    shares = []
+    for number, kind in enumerate(KINDS):
+        if kind not in COMPARED:
+            continue
+        chain = [(what, of_each[:, number]) for what, of_each in found.items() if what != "drawn starts"]
+        parts = [(what, before - after) for (_, before), (what, after) in pairwise(chain)]
+        floor = found["drawn starts"][:, number]
+        parts += [("start", floor), ("remaining", chain[-1][1] - floor)]
+        lower, upper = intervals_of_means(np.stack([values for _, values in parts], axis=1))
+        for column, (what, values) in enumerate(parts):
+            shares.append(Share(label, kind.quantity, what, float(values.mean()), float(lower[column]), float(upper[column])))
+    return shares

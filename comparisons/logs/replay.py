@@ -1,0 +1,202 @@
+"""Tosses as engines continue them from the end of their flights, seen in the frames of the recording."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.logs.flights import Flights, Start, flights_of
+from dropspin.comparisons.logs.intervals import FEWEST
+from dropspin.comparisons.logs.log import Header, Log, load_log
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.recording import record_batch, verify_accepted
+from dropspin.scenarios import DropspinError, Scenario
+from dropspin.scenarios.loading import from_mapping
+from dropspin.scenarios.model import TOUCHING
+from dropspin.scenarios.rotations import cross, length, rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, SPIN, Array
+from dropspin.scenarios.text import counted
+from dropspin.scenarios.truths.flight import flight_states
+from dropspin.scenarios.variations import whole_steps
+
+STEPS_PER_FRAME = 4
+"""Time steps of an engine between two frames: at 148 Hz, 1.69 ms."""
+WHOLE = 1e-6
+"""Steps by which a number of steps may miss a whole one."""
+BATCH_ROWS = 20_000
+"""Steps of tosses of about one length that are held in memory at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Launches:
+    """Where engines take over.
+
+    Attributes:
+        states: States of the centre of mass at the end of each flight, or earlier where noise has put the body below the floor, (m, 13).
+        frames: Times of the frames to compare, from these states on [s], shape (m, n); NaN beyond the end of a toss.
+    """
+
+    states: Array
+    frames: Array
+
+
+def scene_of(header: Header) -> Scenario:
+    """The scene of all tosses: body, gravity and floor; its own start is of no toss.
+
+    Raises:
+        DropspinError: The header has no floor.
+    """
+    if header.floor is None:
+        raise DropspinError("the recording's header has no [floor]; give restitution and friction, as far as they are known.")
+    return from_mapping(
+        {
+            "name": "toss",
+            "duration": 1.0,
+            "body": header.body.model_dump(),
+            "start": {"position": (0.0, 2.0 * header.body.size, 0.0)},
+            "gravity": {"acceleration": (0.0, -header.gravity, 0.0)},
+            "floor": header.floor.model_dump(),
+        }
+    )
+
+
+def flights_in(recording: Flights | Log | str | Path) -> Flights:
+    """The flights of a recording, which may be the path of its header or the name of one that dropspin has.
+
+    Raises:
+        DropspinError: It cannot be loaded, or has no flight.
+    """
+    if isinstance(recording, Flights):
+        return recording
+    log = recording if isinstance(recording, Log) else load_log(recording)
+    found = flights_of(log, np.array([0.0, -log.header.gravity, 0.0]))
+    if found is None:
+        raise DropspinError(f"{log.origin}: no toss has a flight with the acceleration of gravity; dropspin log check says why.")
+    return found
+
+
+def usable(flights: Flights, frames: int = 1) -> list[Start]:
+    """The starts of tosses that have so many frames after the flight.
+
+    Raises:
+        DropspinError: They are too few for an interval.
+    """
+    starts = [start for start in flights.starts() if start.frame + frames < len(start.toss)]
+    if len(starts) < FEWEST:
+        raise DropspinError(
+            f"{flights.log.origin}: has {counted(len(starts), 'toss', 'tosses')} with {counted(frames, 'frame')} after a flight; "
+            f"give at least {FEWEST}."
+        )
+    return starts
+
+
+def launches(scene: Scenario, starts: Sequence[Start], states: Array, dt: float, most: int | None = None) -> Launches:
+    """Launches of tosses from states at the end of their flights, shape (m, 13), with the frames from there on, or at most so many.
+
+    A state below the floor is replaced by that of an earlier time step of its flight.
+
+    Raises:
+        DropspinError: The body is below the floor during all of a flight.
+    """
+    found, frames, sunk = states.copy(), [], TOUCHING * scene.body.size
+    for row, start in enumerate(starts):
+        t, steps = start.toss.t, 0
+        while (depth := -scene.starting_at(found[row]).clearance) > sunk:
+            steps += 1
+            if steps * dt > t[start.frame] - t[start.first]:
+                raise DropspinError(
+                    f"toss {start.toss.name}: the body is {1e3 * depth:.3g} mm below the floor during its flight; "
+                    "correct floor_height, up, tracked_point or the size of the body."
+                )
+            [found[row]] = flight_states(states[row], scene.body.inertia_tensor, scene.acceleration)(np.array([-steps * dt]))
+        frames.append(_from(start, t, most) - t[start.frame] + steps * dt)
+    return Launches(found, _padded(frames))
+
+
+def poses(entry: EngineEntry, scenes: Sequence[Scenario], launched: Launches, dt: float) -> Array:
+    """An engine's motions in the frames, shape (scenes, tosses, frames, 7): centre of mass and orientation; runs in the engine's process.
+
+    Frames beyond the end of a toss are NaN. An engine whose velocities lag its positions starts with those of so much earlier, so that its
+    flight is the recorded one.
+
+    Args:
+        entry: The engine.
+        scenes: The scenes; their own starts are of no toss.
+        launched: The launches.
+        dt: Time step [s].
+
+    Raises:
+        Breakdown: The engine declines a scene.
+        Diverged: A motion is not finite.
+    """
+    states, steps = launched.states.copy(), launched.frames / dt
+    [first] = record_batch(entry.adapter, [whole_steps(scenes[0], dt, 1)], dt)
+    states[:, RATES] -= first.motion.velocity_lag * _rates_of_rates(scenes[0], states)
+    lengths = np.ceil(np.nanmax(steps, axis=1) - WHOLE).astype(int)
+    order, size = np.argsort(lengths, kind="stable"), max(1, BATCH_ROWS // int(lengths.max()))
+    found = np.full((len(scenes), *steps.shape, 7), np.nan)
+    for number, scene in enumerate(scenes):
+        verify_accepted(entry.adapter, scene)
+        for begin in range(0, len(order), size):
+            rows = order[begin : begin + size]
+            base = scene.model_copy(update={"duration": math.nextafter(lengths[rows[-1]] * dt, math.inf)})
+            recordings = record_batch(entry.adapter, [base.starting_at(states[row]) for row in rows], dt)
+            found[number, rows] = _at(np.stack([recording.motion.states[:, : ORIENTATION.stop] for recording in recordings]), steps[rows])
+    if not np.isfinite(found[:, np.isfinite(steps)]).all():
+        raise Diverged("a toss is not finite")
+    return found
+
+
+def _rates_of_rates(scene: Scenario, states: Array) -> Array:
+    """Accelerations and angular accelerations in flight, by Euler's equations [m/s², rad/s²], shape (m, 6)."""
+    spin, inertia = unrotate(states[:, ORIENTATION], states[:, SPIN]), scene.body.inertia_tensor
+    changes = np.linalg.solve(inertia, cross(spin @ inertia, spin).T).T.astype(np.float64)
+    turned = rotate(states[:, ORIENTATION], changes)
+    return np.hstack([np.broadcast_to(scene.acceleration, turned.shape), turned])
+
+
+def _at(motions: Array, steps: Array) -> Array:
+    """Poses of motions, shape (m, k, 7), after numbers of steps that need not be whole, shape (m, n); between two steps, on the chord."""
+    before = np.minimum(np.floor(np.nan_to_num(steps) + WHOLE).astype(int), motions.shape[1] - 2)
+    share, row = np.abs(steps - before)[..., np.newaxis], np.arange(len(steps))[:, np.newaxis]
+    found = (1.0 - share) * motions[row, before] + share * motions[row, before + 1]
+    found[..., ORIENTATION] /= length(found[..., ORIENTATION])[..., np.newaxis]
+    return found
+
+
+def tracked_from_centre(header: Header) -> Array:
+    """The tracked point from the centre of mass, in the body frame [m], shape (3,)."""
+    return np.array(header.tracked_point, dtype=np.float64) - header.body.centre
+
+
+def tracked(header: Header, found: Array) -> Array:
+    """Poses of the tracked point from those of the centre of mass, shape (..., 7)."""
+    moved = found.copy()
+    moved[..., POSITION] += rotate(found[..., ORIENTATION], tracked_from_centre(header))
+    return moved
+
+
+def recorded(starts: Sequence[Start], most: int | None = None) -> Array:
+    """The recorded poses from the end of each flight on, shape (tosses, frames, 7); NaN beyond the end of a toss."""
+    return _padded([_from(start, np.hstack([start.toss.position, start.toss.orientation]), most) for start in starts])
+
+
+def _from(start: Start, rows: Array, most: int | None) -> Array:
+    """The rows of a toss from the end of its flight on, or at most so many after it."""
+    return rows[start.frame : None if most is None else start.frame + most + 1]
+
+
+def _padded(rows: Sequence[Array]) -> Array:
+    """Rows of arrays of different lengths, with NaN at the end of the shorter ones."""
+    found = np.full((len(rows), max(map(len, rows)), *rows[0].shape[1:]), np.nan)
+    for row, one in zip(found, rows, strict=True):
+        row[: len(one)] = one
+    return found
+
+
+def time_step(starts: Sequence[Start]) -> float:
+    """The time step of the engines [s]."""
+    return float(np.median(np.concatenate([np.diff(start.toss.t) for start in starts]))) / STEPS_PER_FRAME

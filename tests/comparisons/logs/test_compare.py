@@ -1,0 +1,115 @@
+"""Errors beside measured tosses: exact where they are planted, and engines apart where they differ."""
+
+import numpy as np
+import pytest
+from support.log_fits import HEADER, WANG, tosses
+
+from dropspin.comparisons.engines.wang import Wang
+from dropspin.comparisons.logs.compare import log_compare
+from dropspin.comparisons.logs.errors import KINDS, body_length, errors
+from dropspin.scenarios.rotations import about, multiply
+from dropspin.scenarios.state import ORIENTATION, POSITION
+from dropspin.scenarios.variations import with_values
+
+COUNT, FRAMES = 12, 70
+
+
+class Dead(Wang):
+    """An engine whose restitution is dead."""
+
+    name = "dead"
+
+    def prepare_batch(self, members, dt):
+        return super().prepare_batch([with_values(member, "floor", restitution=0.0) for member in members], dt)
+
+
+class Diverging(Wang):
+    """An engine whose states are not finite."""
+
+    name = "diverging"
+
+    def prepare_batch(self, members, dt):
+        batch = super().prepare_batch(members, dt)
+        record = batch.record
+        batch.record = lambda steps: np.where(np.arange(steps + 1)[:, np.newaxis] > 10, np.nan, record(steps))
+        return batch
+
+
+OPTIONS = {"contact": "sequential", "law": "coulomb"}
+
+
+@pytest.fixture(scope="module")
+def comparison():
+    """Of tosses that Wang's method made, with the floor of the header."""
+    flights = tosses(np.random.default_rng(3), COUNT, WANG, 0.3, 0.3, frames=FRAMES)
+    same = WANG.replace("]", ",rotation=midpoint]")  # of a cube, the same rotations
+    return log_compare(flights, [WANG, same, "mujoco", Dead(OPTIONS), Diverging(OPTIONS)], jobs=1)
+
+
+def of(rows, **given):
+    return next(row for row in rows if all(getattr(row, key) == value for key, value in given.items()))
+
+
+def test_same_engine_under_two_names_is_in_one_group_and_a_dead_one_is_not(comparison):
+    [mine] = [group for group in comparison.groups["position"] if WANG in group]
+    assert WANG.replace("]", ",rotation=midpoint]") in mine
+    assert Dead(OPTIONS).label not in mine
+    assert of(comparison.pairs, quantity="position", first=WANG, second=Dead(OPTIONS).label).upper < 0.0
+
+
+def test_engine_that_diverges_costs_its_own_row(comparison):
+    assert comparison.left_out == {Diverging(OPTIONS).label: "a toss is not finite"}
+    assert {error.engine for error in comparison.errors}.isdisjoint(comparison.left_out)
+
+
+def test_error_of_the_engine_that_made_the_tosses_is_its_noise_floor(comparison):
+    """The noise of the record adds 2 mrad √3; a part of what is left is none of start, body or step."""
+    own, dead = (of(comparison.errors, engine=name, quantity="position", at="mean") for name in (WANG, Dead(OPTIONS).label))
+    assert own.value == pytest.approx(own.noise_floor, rel=0.75)
+    assert dead.value > 4.0 * own.value
+    assert of(comparison.errors, engine=WANG, quantity="resting face").value == 1.0
+
+
+def test_parts_sum_up_to_the_error(comparison):
+    for quantity in ("position", "orientation"):
+        error = of(comparison.errors, engine="mujoco", quantity=quantity, at="mean")
+        parts = [part.value for part in comparison.parts if (part.engine, part.quantity) == ("mujoco", quantity)]
+        assert sum(parts) == pytest.approx(error.value)
+
+
+def test_planted_errors_measure_as_themselves():
+    """A shift of 10 mm, a turn by 0.1 rad, and a rest 0.1 s later, in frames of 10 ms."""
+    t, size = np.tile(np.arange(80) * 0.01, (2, 1)), body_length(HEADER.body)
+    assert size == pytest.approx(0.1048)
+    measured = np.zeros((2, 80, 7))
+    measured[..., 6] = 1.0
+    measured[..., 1] = 0.0524 + 4.905 * np.maximum(0.4 - t, 0.0) ** 2
+    measured[1, 60:], t[1, 60:] = np.nan, np.nan
+    found = measured.copy()
+    found[..., POSITION] += [0.01, 0.0, 0.0]
+    found[..., ORIENTATION] = multiply(about(np.array([0.0, 1.0, 0.0]), np.array(0.1)), measured[..., ORIENTATION])
+    later = measured.copy()
+    later[:, 10:, 1] = measured[:, :-10, 1]
+
+    def kinds(motion):
+        of_each = errors(HEADER.body, 9.81, np.zeros(3), t, measured, motion)
+        return {(kind.quantity, kind.at): of_each[:, number] for number, kind in enumerate(KINDS)}
+
+    planted, late = kinds(found), kinds(later)
+    for at in ("impact", "+0.1 s", "mean", "end"):
+        assert planted["position", at] == pytest.approx(0.01 / size)
+        assert planted["orientation", at] == pytest.approx(0.1)
+    assert planted["energy", "mean"] == pytest.approx(0.0, abs=1e-12)
+    assert planted["resting face", "end"].all()
+    assert late["rest time", "end"] == pytest.approx(0.1)
+
+
+def test_energy_error_is_that_of_a_known_loss():
+    """A body that moves at 0.9 of the speed has 0.81 of the kinetic energy, all there is without gravity."""
+    t = np.tile(np.arange(20) * 0.01, (1, 1))
+    measured = np.zeros((1, 20, 7))
+    measured[..., 6], measured[0, :, 0] = 1.0, t[0]
+    found = measured.copy()
+    found[..., 0] *= 0.9
+    energy = [kind.quantity for kind in KINDS].index("energy")
+    assert errors(HEADER.body, 0.0, np.zeros(3), t, measured, found)[0, energy] == pytest.approx(1.0 - 0.81)

@@ -42,6 +42,8 @@ UNIT = 0.05
 """Largest relative difference from the ratio of two units."""
 OF_TIME = {1e-6: "times are in ms", 0.25: "the rate is half of the true one", 4.0: "the rate is twice the true one"}
 """Ratios of gravity to the true one, and what gives them."""
+MOST_LOG = 700.0
+"""Logarithm near that of the largest number: intervals that are wider are not determined."""
 USEFUL = {"centre of mass": 0.1, "ratio of inertia": 0.1, "drag": 0.5}
 """Half widths of intervals beyond which a value counts as not identifiable: a share of the size, a share, and 1/s."""
 
@@ -376,7 +378,7 @@ def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
         yield Value(f"centre of mass, {axis}", centre, centre - error, centre + error, "m", needs)
     turning = flights.turning
     for name, value, error in zip(("I_x / I_y", "I_z / I_y"), turning.values, turning.half_widths, strict=True):
-        low, middle, high = (math.exp(value + step) for step in (-error, 0.0, error))
+        low, middle, high = (math.exp(min(value + step, MOST_LOG)) for step in (-error, 0.0, error))
         needs = None if error < USEFUL["ratio of inertia"] else "tosses of 0.3 s that spin at 8 rad/s or more, about different axes"
         yield Value(f"{name} over the header's", middle, low, high, "", needs)
     rate, error = drag.values[-1], drag.half_widths[-1]

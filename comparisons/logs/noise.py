@@ -152,7 +152,7 @@ def regression(flights: Sequence[Samples]) -> Regression:
     typical = float(np.median([samples.t[-1] for samples in flights]))
     unit = np.sqrt(3.0 / typical**3)
     freedom = np.array([samples.freedom for samples in flights])
-    rounding = ROUNDING * max(float(np.abs(samples.values).max()) for samples in flights)
+    rounding = ROUNDING * (max(float(np.abs(samples.values).max()) for samples in flights) or 1.0)  # a body that does not turn has 0
     weights, shared = np.ones(len(flights)), flights[0].shared.shape[2]
 
     def parts(log_ratio: float) -> tuple[Array, Array, float]:

@@ -11,7 +11,7 @@ from dropspin.scenarios import load
 
 TODAY = datetime.date(2026, 3, 1)
 SCENES = [load(name) for name in ("drop-ball", "drop-ball-backspin", "drop-box-corner", "fall-spin")]
-SCENES.append(load("spin-asymmetric").model_copy(update={"duration": 10.0}))  # of 30 s: a third of the time
+SCENES.append(load("spin-asymmetric").model_copy(update={"duration": 5.0}))  # of 30 s: a sixth of the time
 WITH_FLOOR = {"drop-ball", "drop-ball-backspin", "drop-box-corner"}
 TURNING = {"drop-ball-backspin", "drop-box-corner", "fall-spin", "spin-asymmetric"}
 DTS = [8e-3, 4e-3, 2e-3]

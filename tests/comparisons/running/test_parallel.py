@@ -14,7 +14,7 @@ from dropspin.comparisons.running import processes
 from dropspin.comparisons.running.engine_run import run_engine
 from dropspin.comparisons.running.parallel import results_in_parallel
 
-SCENES = ["drop-ball", "spin-asymmetric", "fall-tilted"]
+SCENES = ["drop-ball", "spin-dzhanibekov", "fall-tilted"]
 DTS = [8e-3, 4e-3, 2e-3]
 
 

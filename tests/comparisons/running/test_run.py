@@ -123,9 +123,9 @@ def test_document_direction_of_angular_momentum_is_a_plateau(core):
 
 
 def test_mujoco_rk4_keeps_the_direction_of_angular_momentum():
-    """To 1e-9 rad; measured 2e-14."""
-    found = ds.run("spin-asymmetric", "mujoco[integrator=rk4]", 1e-3)
-    assert value(found, "spin-asymmetric", "mujoco[integrator=rk4]", "angular_momentum_direction_error") <= 1e-9
+    """To 1e-9 rad."""
+    found = ds.run("spin-asymmetric", "mujoco[integrator=rk4]", 2e-3)
+    assert value(found, "spin-asymmetric", "mujoco[integrator=rk4]", "angular_momentum_direction_error", 2e-3) <= 1e-9
 
 
 def test_document_pushes_sideways_on_a_frictionless_floor(core):

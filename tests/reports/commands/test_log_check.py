@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -56,6 +57,14 @@ def test_finding_is_printed_with_alternatives_and_remedy_and_is_exit_code_1(reco
     assert [float(number) for number in found.groups()] == pytest.approx([2.0, 1.0], abs=0.3)
     data = json.loads(dropspin("log", "check", "short.toml", "-o", "out", "--json", cwd=recording).stdout)
     assert [row["kind"] for row in data if row["row"] == "findings"] == ["scale"]
+
+
+def test_page_shows_what_is_printed_of_the_shipped_tosses(tmp_path):
+    """Line by line, up to the places at which lines are broken."""
+    page = (Path(__file__).parents[3] / "docs" / "measured.md").read_text(encoding="utf-8")
+    [shown] = re.findall(r"^```text\n(toss-cube: .*?)^```$", page, re.DOTALL | re.MULTILINE)
+    printed = " ".join(dropspin("log", "check", "toss-cube", cwd=tmp_path).stdout.split())
+    assert [part for part in shown.split("…\n") if " ".join(part.split()) not in printed] == []
 
 
 def test_many_findings_of_one_kind_are_shortened_on_a_terminal_alone():

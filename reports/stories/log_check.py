@@ -6,7 +6,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dropspin.comparisons.logs.check import Check, Finding, TossFacts, Value
+from dropspin.comparisons.logs.check import Check, TossFacts, Value
+from dropspin.comparisons.logs.recorded import Finding
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
 from dropspin.reports.stories.numbers import capitalized, formatted, grouped

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from support.tosses import BRICK, CUBE, made
 
-from dropspin.comparisons.logs.check import Check, Finding, log_check
+from dropspin.comparisons.logs.check import Check, log_check
 from dropspin.comparisons.logs.log import Log, Toss, load_log
+from dropspin.comparisons.logs.recorded import Finding
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
 

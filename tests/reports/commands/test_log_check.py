@@ -11,7 +11,7 @@ import tomlkit
 from support.cli import TERMINAL, assert_refused, dropspin
 from support.tosses import BRICK, made
 
-from dropspin.comparisons.logs.check import Finding
+from dropspin.comparisons.logs.recorded import Finding
 from dropspin.reports.stories.log_check import CheckedLog, sentence
 
 

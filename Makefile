@@ -39,8 +39,9 @@ faults: $(VENV)/.installed-dev        ## engines with one planted fault each aga
 	PYTHONPATH=tests $(BIN)/python -m support.fault_suite
 	PYTHONPATH=tests $(BIN)/python -m support.detection_power
 
-coverage: $(VENV)/.installed-dev      ## how often the intervals of asymptotic errors are right: docs/coverage.md
+coverage: $(VENV)/.installed-dev      ## how often intervals are right: docs/coverage.md, and the table in docs/measured.md
 	PYTHONPATH=tests $(BIN)/python -m support.interval_coverage
+	PYTHONPATH=tests $(BIN)/python -m support.log_coverage
 
 bench: $(VENV)/.installed             ## speed beside the engines, as ratios: out/bench.json, out/bench.svg
 	$(BIN)/python benchmarks/speed.py

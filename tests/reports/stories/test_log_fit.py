@@ -1,0 +1,31 @@
+"""What is said of friction and restitution: bounds where there are bounds, and whose property a disagreement is."""
+
+from dropspin.comparisons.logs.fit import Disagreement, Estimate, LogFit
+from dropspin.reports.document import Sentences, Table
+from dropspin.reports.stories.log_fit import document, interval
+
+
+def estimate(parameter, has_lower, has_upper):
+    return Estimate("mujoco", parameter, 0.3, 0.2 if has_lower else 0.0, 0.4 if has_upper else 1.0, has_lower, has_upper)
+
+
+def test_interval_has_only_the_ends_that_the_tosses_give():
+    texts = [interval(estimate("friction", *ends)) for ends in ((True, True), (True, False), (False, True), (False, False))]
+    assert texts == ["0.300 (0.200 to 0.400)", "at least 0.200", "at most 0.400", "not identified"]
+
+
+def test_disagreement_on_restitution_is_a_setting_and_unidentified_friction_is_explained():
+    disagreement = Disagreement("restitution", "mujoco", "wang", -0.158, -0.195, -0.133)
+    estimates = (estimate("friction", False, False), estimate("restitution", True, True))
+    fit = LogFit(100, 8, estimates, (disagreement,), {"mujoco": 0.00224}, {"broken": "out of order"})
+    table, sentences = document(fit).parts
+    assert isinstance(table, Table)
+    assert table.rows == [
+        {"engine": "mujoco", "friction": "not identified", "restitution": "0.300 (0.200 to 0.400)", "discrepancy": "2.24 mm"}
+    ]
+    assert isinstance(sentences, Sentences)
+    text = " ".join(sentences.items)
+    assert "Two engines disagree on restitution: it is a setting of the engine, not a property of the body." in text
+    assert "mujoco needs 0.158 less than wang" in text
+    assert "Friction is not identified with mujoco: no toss slides" in text
+    assert "broken, out of order" in text

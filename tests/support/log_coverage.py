@@ -1,0 +1,40 @@
+"""How often intervals of friction and restitution hold for synthetic tosses: part of `make coverage`, prints the table of docs/measured.md.
+
+An engine makes the tosses, with .2 mm and 2 mrad of white noise at 148 Hz; it and another engine are fitted to them.
+"""
+
+import sys
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+
+from dropspin.comparisons.logs.fit import log_fit
+from support.in_process import engines_in_process
+from support.log_fits import WANG, tosses
+
+RECORDINGS, COUNTS, OTHER = 200, (10, 20, 50), "mujoco"
+FRICTION, RESTITUTION = (0.1, 0.4), (0.2, 0.6)
+HEAD = ["tosses", "friction", "restitution", f"friction by {OTHER}", "disagreement on restitution"]
+
+
+def outcome(count, number):
+    """Whether the intervals hold of friction and restitution, and of friction by the other engine, and whether the two disagree."""
+    random = np.random.default_rng([count, number])
+    truth = {"friction": random.uniform(*FRICTION), "restitution": random.uniform(*RESTITUTION)}
+    with engines_in_process():
+        fit = log_fit(tosses(random, count, WANG, **truth), [WANG, OTHER], jobs=1)
+    holds = [one.lower <= truth[one.parameter] <= one.upper for one in fit.estimates[:3]]
+    return [*holds, any(one.parameter == "restitution" for one in fit.disagreements)]
+
+
+def main():
+    rows = [HEAD, ["---"] * len(HEAD)]
+    with ProcessPoolExecutor() as pool:
+        for count in COUNTS:
+            shares = np.mean(list(pool.map(outcome, [count] * RECORDINGS, range(RECORDINGS))), axis=0)
+            rows.append([str(count), *(f"{100.0 * share:.1f} %" for share in shares)])
+    sys.stdout.writelines(f"| {' | '.join(cells)} |\n" for cells in rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -12,19 +12,18 @@ from pathlib import Path
 
 import numpy as np
 
-from dropspin.comparisons.logs.flights import (
+from dropspin.comparisons.logs.flight import (
     ACCELERATION,
     DRAG,
     FEWEST_FRAMES,
     OFFSET,
-    Flights,
     accelerations,
     falls,
-    flights_of,
     positions,
     window_size,
     without,
 )
+from dropspin.comparisons.logs.flights import Flights, flights_of
 from dropspin.comparisons.logs.log import LENGTHS, UPRIGHT, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
 from dropspin.comparisons.logs.recorded import Finding, of_frames, of_quaternions, of_spins

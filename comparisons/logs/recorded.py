@@ -6,10 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dropspin.comparisons.logs.flights import FEWEST_FRAMES, SURPRISING, Flights, rotation, surprise
+from dropspin.comparisons.logs.flight import FEWEST_FRAMES, SURPRISING, surprise
+from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.log import UPRIGHT, Header, Irregularity, Log, Toss
 from dropspin.comparisons.logs.noise import Noise
 from dropspin.comparisons.logs.rest import level_share
+from dropspin.comparisons.logs.rotors import rotation
 from dropspin.scenarios.rotations import conjugate, length, multiply, rotate, unrotate
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.text import counted

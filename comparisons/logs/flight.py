@@ -1,0 +1,170 @@
+"""Free flights in a recording: where each begins and ends.
+
+    p(t) = x₀ + v₀ t + a t²/2 + R(t) d,    R(t) that of a free rotor
+
+p is the tracked point, at d from the centre of mass in the body frame. Frames are of a flight as long as the next one is where the flight
+predicts it, within the noise that the recording itself shows.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from dropspin.comparisons.logs.log import Log, Toss
+from dropspin.comparisons.logs.noise import Noise, Regression, Samples
+from dropspin.scenarios.rotations import length, rotate
+from dropspin.scenarios.state import Array
+
+WINDOW = 0.05
+"""Length of the pieces in which a fall is looked for [s]; at least `FEWEST_FRAMES` frames."""
+FEWEST_FRAMES = 6
+"""Of a flight; a parabola in three coordinates leaves half of the numbers of six frames."""
+NEAR = 0.25
+"""How far the acceleration of a piece of a fall may be from that of the falls, as a share."""
+SURPRISING = 25.9
+"""Squared distance over variance beyond which a frame is not of the flight: χ² with 3 degrees of freedom exceeds it once in 1e5."""
+LONGEST = 200
+"""Frames that a prediction uses, and that the regressions use of a flight, evenly chosen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """A part of a toss during which nothing touches the body.
+
+    Attributes:
+        toss: The toss.
+        first: Its first frame.
+        end: The frame after its last one.
+    """
+
+    toss: Toss
+    first: int
+    end: int
+
+    def __len__(self) -> int:
+        return self.end - self.first
+
+    @cached_property
+    def rows(self) -> "np.typing.NDArray[np.intp]":
+        """Its frames, or `LONGEST` of them, with the first and the last one."""
+        return np.unique(np.linspace(self.first, self.end - 1, min(len(self), LONGEST)).round().astype(int))
+
+    @property
+    def t(self) -> Array:
+        """Times of `rows` from the first frame on [s]."""
+        return self.toss.t[self.rows] - self.toss.t[self.first]
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return float(self.t[-1])
+
+    def backwards(self) -> "Flight":
+        """The same frames in reverse."""
+        toss = self.toss
+        turned = replace(toss, t=toss.t[-1] - toss.t[::-1], position=toss.position[::-1], orientation=toss.orientation[::-1])
+        return Flight(turned, len(toss.t) - self.end, len(toss.t) - self.first)
+
+
+def positions(flight: Flight) -> Samples:
+    """The tracked point as samples: own parameters x₀, v₀; shared ones the acceleration [m/s²], d [m] and the decay rate of v [1/s]."""
+    t, eye = flight.t[:, np.newaxis, np.newaxis], np.eye(3)
+    position, orientation = flight.toss.position[flight.rows], flight.toss.orientation[flight.rows]
+    matrices = np.stack([rotate(orientation, axis) for axis in eye], axis=2)
+    parabola = np.polynomial.polynomial.polyfit(flight.t, position, 2)
+    slowed = -(parabola[1] * t[:, 0] ** 2 / 2.0 + parabola[2] * t[:, 0] ** 3 / 3.0)
+    own = np.concatenate([np.broadcast_to(eye, (len(t), 3, 3)), t * eye], axis=2)
+    shared = np.concatenate([t**2 / 2.0 * eye, matrices, slowed[..., np.newaxis]], axis=2)
+    return Samples(flight.t, position, own, shared)
+
+
+ACCELERATION, OFFSET, DRAG = slice(0, 3), slice(3, 6), slice(6, 7)
+"""The shared parameters of `positions`."""
+
+
+def without(samples: Samples, known: Array, *parts: slice) -> Samples:
+    """The samples with some shared parameters known, shape (7,), and only `parts` of them to be found."""
+    wanted = [index for part in parts for index in range(part.start, part.stop)]
+    fixed = [index for index in range(samples.shared.shape[2]) if index not in wanted]
+    values = samples.values - samples.shared[..., fixed] @ known[fixed]
+    return Samples(samples.t, values, samples.own, samples.shared[..., wanted])
+
+
+def falls(log: Log, acceleration: Array) -> list[Flight | None]:
+    """Of each toss the first long part whose pieces all have about an acceleration [m/s²], shape (3,); None without such a part.
+
+    Long is more than half as long as the longest one: later parts are between impacts.
+    """
+    found: list[Flight | None] = []
+    for toss in log.tosses:
+        size = window_size(toss)
+        if len(toss.t) < size:
+            found.append(None)
+            continue
+        near = length(accelerations(toss, size) - acceleration) < NEAR * length(acceleration)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
+        runs = [Flight(toss, int(first), int(end) + size - 1) for first, end in edges.reshape(-1, 2)]
+        longest = max(map(len, runs), default=0)
+        found.append(next((run for run in runs if 2 * len(run) > longest), None))
+    return found
+
+
+def window_size(toss: Toss) -> int:
+    """Frames of the pieces in which a fall is looked for."""
+    return max(FEWEST_FRAMES, round(WINDOW / float(np.median(np.diff(toss.t)))))
+
+
+def accelerations(toss: Toss, size: int) -> Array:
+    """Of the tracked point in each piece of some frames, by a parabola [m/s²], shape (pieces, 3)."""
+    t = sliding_window_view(toss.t, size)
+    t = t - t.mean(axis=1, keepdims=True)
+    curved = t**2 - np.mean(t**2, axis=1, keepdims=True)
+    curved -= t * (np.sum(t * curved, axis=1) / np.sum(t * t, axis=1))[:, np.newaxis]
+    pieces = sliding_window_view(toss.position, size, axis=0)
+    return 2.0 * np.einsum("wi,wki->wk", curved, pieces) / np.sum(curved**2, axis=1)[:, np.newaxis]
+
+
+def grown(flights: Sequence[Flight], found: Regression) -> list[Flight]:
+    """Flights from two frames less at both ends, as far as each next frame is where it is predicted."""
+    return [_grown(flight, found.values, found.noise, weight) for flight, weight in zip(flights, found.weights, strict=True)]
+
+
+def _grown(flight: Flight, shared: Array, noise: Noise, weight: float) -> Flight:
+    own = Noise(noise.white / np.sqrt(min(weight, 1.0)), noise.slow / np.sqrt(min(weight, 1.0)))
+    less = min(2, (len(flight) - FEWEST_FRAMES) // 2)
+    if less > 0:
+        flight = replace(flight, first=flight.first + less, end=flight.end - less)
+    end = _end(flight, shared, own)
+    first = len(flight.toss.t) - _end(flight.backwards(), shared, own)
+    # What touches the body begins softly, and before the frame that it moves visibly.
+    return replace(flight, first=first + (first > 0), end=end - (end < len(flight.toss.t)))
+
+
+def _end(flight: Flight, shared: Array, noise: Noise) -> int:
+    """The frame from which on the positions are not those of the flight."""
+    while flight.end < len(flight.toss.t) and surprise(flight, flight.end, shared, noise) < SURPRISING:
+        flight = replace(flight, end=flight.end + 1)
+    return flight.end
+
+
+def surprise(flight: Flight, frame: int, shared: Array, noise: Noise, delay: float = 0.0) -> float:
+    """Squared distance of a later frame from its prediction, over the variance; `delay` is added to its time [s]."""
+    recent = Flight(flight.toss, max(flight.first, flight.end - LONGEST), flight.end)
+    toss = recent.toss
+    times = np.append(toss.t[recent.first : recent.end], toss.t[frame] + delay)
+    rows = np.append(np.arange(recent.first, recent.end), frame)
+    together = replace(toss, t=times, position=toss.position[rows], orientation=toss.orientation[rows])
+    samples = without(positions(Flight(together, 0, len(rows))), shared)
+    covariance = noise.covariance(samples.t)
+    line = np.stack([np.ones(len(rows)), samples.t], axis=1)
+    before = np.linalg.solve(covariance[:-1, :-1], np.column_stack([line[:-1], samples.values[:-1], covariance[:-1, -1]]))
+    normal = np.linalg.inv(line[:-1].T @ before[:, :2])
+    beta = normal @ (line[:-1].T @ before[:, 2:5])
+    gain = before[:, 5]
+    left = line[-1] - gain @ line[:-1]
+    predicted = left @ beta + gain @ samples.values[:-1]
+    variance = float(covariance[-1, -1] - gain @ covariance[:-1, -1] + left @ normal @ left)
+    return float(np.sum((samples.values[-1] - predicted) ** 2)) / variance

@@ -1,6 +1,7 @@
 """The files that a study writes: tables as CSV and JSON, a Markdown page, pictures, and `section.json`, from which a report reads it."""
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +16,7 @@ from dropspin.reports.plots.chart import figure_of, save_figure
 from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.stories.history import document as history_document
 from dropspin.reports.stories.study import Study
-from dropspin.scenarios import DropspinError
+from dropspin.scenarios import DropspinError, Scenario
 
 
 def write_study(study: Study, folder: Path) -> Document:
@@ -33,6 +34,16 @@ def write_parquet(study: Study, folder: Path) -> None:
     import pyarrow.parquet as pq
 
     pq.write_table(pa.Table.from_pylist(study.rows()), folder / f"{study.study}.parquet")
+
+
+def write_scenes(scenes: Iterable[Scenario], folder: Path) -> None:
+    """Write scenes as TOML files, each by its name, into a new folder."""
+    import tomlkit
+
+    folder.mkdir()
+    for scene in scenes:
+        values = scene.model_dump(mode="json", exclude_none=True, exclude={"name", "summary", "source", "tags", "expect"})
+        (folder / f"{file_name(scene.name)}.toml").write_text(tomlkit.dumps(values), encoding="utf-8")
 
 
 def write_history(history: History, folder: Path) -> Document:

@@ -6,7 +6,7 @@ tell two causes apart, both are alternatives, and what separates them is said.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
@@ -68,12 +68,17 @@ class TossFacts:
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """Values, findings and a line for each toss; `flights` is None without free flight."""
+    """Values, findings and a line for each toss, by the flights that were found."""
 
     values: tuple[Value, ...]
     findings: tuple[Finding, ...]
     tosses: tuple[TossFacts, ...]
-    flights: Flights | None
+    flights: Flights
+
+    @property
+    def reads_the_columns_right(self) -> bool:
+        """Whether units, axes and quaternions are what the header says, but for an error of the scale."""
+        return not any(finding.kind in ("up", "unit", "quaternion") for finding in self.findings)
 
 
 def log_check(recording: Log | str | Path) -> Check:
@@ -99,9 +104,10 @@ def log_check(recording: Log | str | Path) -> Check:
         )
     drag = _drag(flights)
     found = [*_of_units(flights, down), *of_quaternions(log, flights), *of_spins(flights), *of_frames(flights)]
-    if not any(finding.kind in ("up", "unit", "quaternion") for finding in found):
-        found += [*_of_scale(flights), *_of_offset(flights), *_of_inertia(flights, drag)]
-    return Check(tuple(_values(flights, drag)), tuple(found), tuple(_tosses(flights)), flights)
+    check = Check(tuple(_values(flights, drag)), tuple(found), tuple(_tosses(flights)), flights)
+    if not check.reads_the_columns_right:
+        return check
+    return replace(check, findings=(*found, *_of_scale(flights), *_of_offset(flights), *_of_inertia(flights, drag)))
 
 
 def _acceleration(log: Log, down: Array) -> Array:

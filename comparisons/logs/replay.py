@@ -63,6 +63,22 @@ def scene_of(header: Header) -> Scenario:
     )
 
 
+def scenes_of(flights: Flights) -> list[Scenario]:
+    """The scene of each toss that has frames after its flight, from the end of the flight to the end of the record.
+
+    Raises:
+        DropspinError: The header has no floor, or a body is below it during all of its flight.
+    """
+    scene, found = scene_of(flights.log.header), []
+    for start in flights.starts():
+        if start.frame + 1 < len(start.toss):
+            dt = time_step([start])
+            launched = launches(scene, [start], start.state[np.newaxis], dt)
+            named = {"name": f"toss-{start.toss.name}", "duration": float(launched.frames[0, -1])}
+            found.append(scene.model_copy(update=named).starting_at(launched.states[0]))
+    return found
+
+
 def flights_in(recording: Flights | Log | str | Path) -> Flights:
     """The flights of a recording, which may be the path of its header or the name of one that dropspin has.
 

@@ -105,7 +105,6 @@ def test_a_missing_frame_is_named_with_its_place() -> None:
 def test_a_spin_in_the_body_frame_is_named() -> None:
     with_spin = changed(sound(), angular_velocity=lambda toss: np.zeros((len(toss), 3)))
     check = log_check(with_spin)
-    assert check.flights is not None
     rotors = {rotor.flight.toss.name: rotor for rotor in check.flights.rotations}
     given = changed(with_spin, angular_velocity=lambda toss: unrotate(toss.orientation, rotors[toss.name](toss.t)[1]))
     assert [finding.cure for finding in log_check(given).findings] == ['spin_frame = "body"']

@@ -12,7 +12,9 @@ from support.cli import TERMINAL, assert_refused, dropspin
 from support.tosses import BRICK, made
 
 from dropspin.comparisons.logs.recorded import Finding
+from dropspin.comparisons.logs.replay import flights_in
 from dropspin.reports.stories.log_check import CheckedLog, sentence
+from dropspin.scenarios import load
 
 
 @pytest.fixture
@@ -57,6 +59,18 @@ def test_finding_is_printed_with_alternatives_and_remedy_and_is_exit_code_1(reco
     assert [float(number) for number in found.groups()] == pytest.approx([2.0, 1.0], abs=0.3)
     data = json.loads(dropspin("log", "check", "short.toml", "-o", "out", "--json", cwd=recording).stdout)
     assert [row["kind"] for row in data if row["row"] == "findings"] == ["scale"]
+
+
+def test_scene_of_each_toss_continues_it(tmp_path):
+    assert dropspin("log", "check", "toss-cube", "-o", "out", cwd=tmp_path).returncode == 1
+    files = sorted((tmp_path / "out" / "scenes").glob("*.toml"))
+    assert len(files) == 100
+    flights = flights_in("toss-cube")
+    [start] = [start for start in flights.starts() if start.toss.name == "4"]
+    scene = load(tmp_path / "out" / "scenes" / "toss-4.toml")
+    np.testing.assert_allclose(scene.initial_state, start.state, rtol=0.0, atol=1e-15)
+    assert scene.duration == pytest.approx(start.toss.t[-1] - start.toss.t[start.frame])
+    assert scene.floor == flights.log.header.floor
 
 
 def test_page_shows_what_is_printed_of_the_shipped_tosses(tmp_path):

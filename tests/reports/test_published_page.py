@@ -5,7 +5,7 @@ import re
 import pytest
 from support.published_page import END, PAGE, START, output_of
 
-from dropspin.comparisons.published.sources import source_names
+from dropspin.comparisons.published.sources import sources
 
 SLOW = ("gazebo-boxes", "simbenchmark-bouncing")
 """Sources that take seconds, and whose tables have values of an engine that need not be installed."""
@@ -27,9 +27,10 @@ def page():
 
 def test_sections_of_the_page_are_what_the_command_writes():
     printed = sections(page())
-    names = [name for name in source_names() if name not in SLOW]
+    without_data = [source.name for source in sources()]
+    names = [name for name in without_data if name not in SLOW]
     written = sections(without_rounding(output_of(*names)))
-    assert len(printed) == len(source_names()) + 1
+    assert len(printed) == len(without_data) + 1
     del written["All sources"]
     assert written == {title: text for title, text in printed.items() if title.partition(":")[0] in names}
 

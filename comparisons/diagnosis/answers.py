@@ -14,7 +14,7 @@ NOTEWORTHY = 0.01
 """Share from which a difference is a finding."""
 WATCHED = 0.3  # s
 UNTURNED = 0.05  # rad
-TIPS = "tips over"
+TIPS = "tips or rolls"
 REBOUND, COEFFICIENT = "rebound / impact speed", "coefficient of the contact"
 """The quantities that have targets."""
 OF_FALLS, OF_SPINS = ("damping", "armature", "gravcomp"), ("damping", "armature")

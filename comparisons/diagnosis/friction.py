@@ -23,7 +23,7 @@ ONE_WAY = 0.05
 def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The distance in which a body that slides stops, along an axis of the surface and at 45 degrees to it."""
     facts, causes = body.facts, body.causes.get("slide", ())
-    if not facts.lands or not facts.friction > 0.0:
+    if not facts.lands or not facts.friction > 0.0 or _is_ball(facts):
         return []
     free, exact = SLIDE**2 / (2.0 * facts.friction * facts.gravity), _stop(facts)
     blank = Answer("slide", "stopping distance", "m", speed=SLIDE, physical=free)
@@ -48,7 +48,7 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
 
 
 def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direction: Array) -> list[float]:
-    """The distances in which a body that slides in a direction stops [m]; empty if it tips over."""
+    """The distances in which a body that slides in a direction stops [m]; empty if it tips or rolls."""
     facts, found = body.facts, []
     for dt, rest in zip(dts, rests, strict=True):
         start = rest.copy()
@@ -74,7 +74,7 @@ def _stop(facts: Facts) -> float:
 def creep(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The speed of a body on a slope of half of its friction, which should hold it."""
     facts, dt = body.facts, dts[0]
-    if not facts.lands or not facts.friction > 0.0:
+    if not facts.lands or not facts.friction > 0.0 or _is_ball(facts):
         return []
     slope = math.atan(0.5 * facts.friction)
     gravity = facts.gravity * np.array([math.sin(slope), -math.cos(slope), 0.0])
@@ -92,7 +92,7 @@ def creep(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
 def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The speed that a ball keeps as it rolls for a second."""
     facts = body.facts
-    if not facts.lands or len(facts.colliding) != 1 or not facts.colliding[0].shape.is_ball or facts.offset.any():
+    if not facts.lands or not _is_ball(facts):
         return []
     radius, inertia = float(facts.colliding[0].shape.semi_axes[0]), float(facts.principal[0].mean())
     kept = []
@@ -108,3 +108,8 @@ def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     drag = (facts.falls.linear + facts.spins[0].linear / radius**2, facts.falls.quadratic + facts.spins[0].quadratic / radius**3)
     exact = float(spin_about_axis(1.0, 1.0, heavy, 0.0, *drag))
     return [judged(body, answer, dts, kept, [exact] * len(dts))]
+
+
+def _is_ball(facts: Facts) -> bool:
+    """Whether a body is a ball about its centre of mass, which rolls where others slide."""
+    return len(facts.colliding) == 1 and facts.colliding[0].shape.is_ball and not facts.offset.any()

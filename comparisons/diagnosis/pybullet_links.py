@@ -116,7 +116,10 @@ class Link:
             yield "inertial", Setting("no inertial", self.element.file, self.element.line), f"{self.mass:g} kg"
         elif np.abs(written - self.inertia).max() > SAME * np.abs(written).max():
             moments = ", ".join(f"{moment:.3g}" for moment in self.dynamics[2])
-            made = f"replaced by that of the bounding box of the collision geometry: {moments} kg m²"
+            times = " times <inertia_scaling>" if next(self.element.every("inertia_scaling"), None) else ""
+            is_ball = len(self.geometry) == 1 and next(self.element.every("sphere"), None) is not None
+            of = "the sphere" if is_ball else "the bounding box of the collision geometry"
+            made = f"replaced by that of {of}{times}: {moments} kg m²"
             yield "inertia", next(self.element.every("inertia")).words, made
         for element in self.element.every(*OF_CONTACT):
             is_read = element.parent is not None and element.parent.tag == "contact"

@@ -10,7 +10,7 @@ pytest.importorskip("pybullet", exc_type=ImportError)
 from dropspin.comparisons.diagnosis import landing
 from dropspin.comparisons.diagnosis.answers import REBOUND
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble
-from dropspin.comparisons.diagnosis.friction import roll, slide
+from dropspin.comparisons.diagnosis.friction import creep, roll, slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.pybullet_body import PyBulletModel
@@ -263,3 +263,18 @@ def test_the_server_holds_one_world(tmp_path):
     block.motions(block.facts.start()[np.newaxis], DTS[0], 1, np.zeros(3), floor=True)
     assert server().getNumBodies() == 2
     assert math.isclose(server().getPhysicsEngineParameters()["fixedTimeStep"], DTS[0])
+
+
+def test_moments_of_a_sphere_are_named_with_the_factor_that_the_file_has(tmp_path):
+    # 2/5 m r² = 0.1 kg m², times 3; as a solid sphere, 0.1 is the file's value too.
+    ball = body(tmp_path, link(BALL, extra='<contact><inertia_scaling value="3.0"/></contact>'))
+    [(name, _, made)] = ball.facts.ignored
+    assert name == "inertia"
+    assert made == "replaced by that of the sphere times <inertia_scaling>: 0.3, 0.3, 0.3 kg m²"
+
+
+def test_a_ball_rolls_and_has_no_row_of_slides(tmp_path):
+    ball = body(tmp_path, link(BALL))
+    assert slide(ball, DTS) == []
+    assert creep(ball, DTS) == []
+    assert [answer.quantity for answer in roll(ball, DTS)] == ["fraction kept in 1 s"]

@@ -18,7 +18,7 @@ from dropspin.comparisons.logs.flight import (
     FEWEST_FRAMES,
     OFFSET,
     accelerations,
-    falls,
+    is_near,
     positions,
     window_size,
     without,
@@ -103,7 +103,7 @@ def log_check(recording: Log | str | Path) -> Check:
             "the rate of the frames."
         )
     drag = _drag(flights)
-    found = [*_of_units(flights, down), *of_quaternions(log, flights), *of_spins(flights), *of_frames(flights)]
+    found = [*_of_units(flights), *of_quaternions(log, flights), *of_spins(flights), *of_frames(flights)]
     check = Check(tuple(_values(flights, drag)), tuple(found), tuple(_tosses(flights)), flights)
     if not check.reads_the_columns_right:
         return check
@@ -112,15 +112,16 @@ def log_check(recording: Log | str | Path) -> Check:
 
 def _acceleration(log: Log, down: Array) -> Array:
     """The free acceleration: the header's, if most tosses fall with it, else that of other units and axes that most tosses fall with."""
+    pieces = [accelerations(toss, window_size(toss)) for toss in log.tosses if len(toss) >= window_size(toss)]
 
     def falling(acceleration: Array) -> int:
-        return sum(flight is not None for flight in falls(log, acceleration))
+        return sum(bool(is_near(of_toss, acceleration).any()) for of_toss in pieces)
 
     if 2 * falling(down) > len(log.tosses):
         return down
-    factors = {factor for a, b in product(LENGTHS.values(), repeat=2) for factor in (a / b,)} | {1e-6, 1e6, 0.25, 4.0}
+    factors = {a / b for a, b in product(LENGTHS.values(), repeat=2)} | {1e6, *OF_TIME}
     candidates = [factor * sign * np.roll(down, turn) for factor in sorted(factors) for turn in range(3) for sign in (1.0, -1.0)]
-    candidates += [accelerations(toss, window_size(toss))[0] for toss in log.tosses if len(toss) >= window_size(toss)]
+    candidates += [of_toss[0] for of_toss in pieces]
     return max([down, *candidates], key=falling)
 
 
@@ -129,7 +130,7 @@ def _half_widths(found: Regression) -> Array:
     return found.half_widths_of(ALARM)
 
 
-def _of_units(flights: Flights, down: Array) -> Iterator[Finding]:
+def _of_units(flights: Flights) -> Iterator[Finding]:
     """Of accelerations that are along another axis or far from gravity."""
     header, found = flights.log.header, flights.moving.values[ACCELERATION]
     ratio, recorded = float(np.linalg.norm(found)) / header.gravity, unrotate(np.array(UPRIGHT[header.up]), -found)

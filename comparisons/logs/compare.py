@@ -24,6 +24,7 @@ from dropspin.comparisons.logs.replay import (
     Launches,
     flights_in,
     launches,
+    of_each_engine,
     poses,
     recorded,
     scene_of,
@@ -33,8 +34,7 @@ from dropspin.comparisons.logs.replay import (
     usable,
 )
 from dropspin.comparisons.running.entries import engine_entries
-from dropspin.comparisons.running.inputs import EngineEntry, ignore
-from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
+from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import Scenario
@@ -163,10 +163,7 @@ def log_compare(
     def all_errors(entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> dict[str, Array] | Breakdown:
         return _errors(entry, given[entry.label], measured, processes, report)
 
-    with started_crews(jobs, len(entries), entries, resources) as crews:
-        results = results_in_parallel(entries, all_errors, crews, on_progress or ignore)
-    found = {entry.label: result for entry, result in zip(entries, results, strict=True) if not isinstance(result, Breakdown)}
-    left_out = {entry.label: result.reason for entry, result in zip(entries, results, strict=True) if isinstance(result, Breakdown)}
+    found, left_out = of_each_engine(entries, all_errors, on_progress, resources, jobs)
     pairs = [pair for number, kind in enumerate(KINDS) if kind in COMPARED for pair in _pairs(kind, number, found)]
     return LogComparison(
         len(starts),

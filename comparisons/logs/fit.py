@@ -23,10 +23,20 @@ from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.intervals import expanded, resamples
 from dropspin.comparisons.logs.log import Header, Log
-from dropspin.comparisons.logs.replay import Launches, flights_in, launches, poses, recorded, scene_of, time_step, tracked, usable
+from dropspin.comparisons.logs.replay import (
+    Launches,
+    flights_in,
+    launches,
+    of_each_engine,
+    poses,
+    recorded,
+    scene_of,
+    time_step,
+    tracked,
+    usable,
+)
 from dropspin.comparisons.running.entries import engine_entries
-from dropspin.comparisons.running.inputs import EngineEntry, ignore
-from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
+from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import Scenario
@@ -174,10 +184,7 @@ def log_fit(
     def profile(entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> _Profile | Breakdown:
         return _profile(entry, problem, processes, report)
 
-    with started_crews(jobs, len(entries), entries, resources) as crews:
-        found = results_in_parallel(entries, profile, crews, on_progress or ignore)
-    profiles = {entry.label: one for entry, one in zip(entries, found, strict=True) if isinstance(one, _Profile)}
-    left_out = {entry.label: one.reason for entry, one in zip(entries, found, strict=True) if isinstance(one, Breakdown)}
+    profiles, left_out = of_each_engine(entries, profile, on_progress, resources, jobs)
     estimates = [_estimate(label, one, column, size) for label, one in profiles.items() for column in range(len(FIRST_GRID))]
     pairs = [
         _disagreement(first, second, profiles[first], profiles[second], column, size)

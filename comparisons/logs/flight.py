@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from dropspin.comparisons.logs.log import Log, Toss
 from dropspin.comparisons.logs.noise import Noise, Regression, Samples
@@ -48,7 +49,7 @@ class Flight:
         return self.end - self.first
 
     @cached_property
-    def rows(self) -> "np.typing.NDArray[np.intp]":
+    def rows(self) -> NDArray[np.intp]:
         """Its frames, or `LONGEST` of them, with the first and the last one."""
         return np.unique(np.linspace(self.first, self.end - 1, min(len(self), LONGEST)).round().astype(int))
 
@@ -104,12 +105,17 @@ def falls(log: Log, acceleration: Array) -> list[Flight | None]:
         if len(toss.t) < size:
             found.append(None)
             continue
-        near = length(accelerations(toss, size) - acceleration) < NEAR * length(acceleration)
+        near = is_near(accelerations(toss, size), acceleration)
         edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
         runs = [Flight(toss, int(first), int(end) + size - 1) for first, end in edges.reshape(-1, 2)]
         longest = max(map(len, runs), default=0)
         found.append(next((run for run in runs if 2 * len(run) > longest), None))
     return found
+
+
+def is_near(pieces: Array, acceleration: Array) -> NDArray[np.bool_]:
+    """Whether accelerations of pieces are about a given one [m/s²], shapes (pieces, 3) and (3,)."""
+    return length(pieces - acceleration) < NEAR * length(acceleration)
 
 
 def window_size(toss: Toss) -> int:
@@ -133,7 +139,7 @@ def grown(flights: Sequence[Flight], found: Regression) -> list[Flight]:
 
 
 def _grown(flight: Flight, shared: Array, noise: Noise, weight: float) -> Flight:
-    own = Noise(noise.white / np.sqrt(min(weight, 1.0)), noise.slow / np.sqrt(min(weight, 1.0)))
+    own = noise.of_weight(min(weight, 1.0))
     less = min(2, (len(flight) - FEWEST_FRAMES) // 2)
     if less > 0:
         flight = replace(flight, first=flight.first + less, end=flight.end - less)

@@ -73,12 +73,10 @@ class Flights:
         header = self.log.header
         known = np.concatenate([[0.0, -header.gravity, 0.0], np.asarray(header.tracked_point) - header.body.centre, [0.0]])
         each = zip(self.found, self.rotations, self.moving.weights, self.turning.weights, strict=True)
-        return [_start(flight, known, rotor, *self._noises(moved, turned)) for flight, rotor, moved, turned in each]
-
-    def _noises(self, moved: float, turned: float) -> tuple[Noise, Noise]:
-        of = (self.moving.noise, moved), (self.turning.noise, turned)
-        position, orientation = (Noise(noise.white / np.sqrt(weight), noise.slow / np.sqrt(weight)) for noise, weight in of)
-        return position, orientation
+        position, orientation = self.moving.noise, self.turning.noise
+        return [
+            _start(flight, known, rotor, position.of_weight(moved), orientation.of_weight(turned)) for flight, rotor, moved, turned in each
+        ]
 
 
 def _start(flight: Flight, known: Array, rotor: Rotation, position_noise: Noise, orientation_noise: Noise) -> Start:

@@ -36,6 +36,10 @@ class Noise:
     white: float
     slow: float
 
+    def of_weight(self, weight: float) -> "Noise":
+        """The noise of a flight whose variances are this factor smaller."""
+        return Noise(self.white / np.sqrt(weight), self.slow / np.sqrt(weight))
+
     def covariance(self, t: Array) -> Array:
         """Of the errors at times from the first one on [s], shape (n,): (n, n)."""
         early, late = np.minimum.outer(t, t), np.maximum.outer(t, t)
@@ -131,7 +135,7 @@ class Regression:
     def half_widths_of(self, outside: float) -> Array:
         """Of intervals that θ is outside of with a probability, shape (m,): quantiles of Student's t.
 
-        Its degrees of freedom are the flights less one, with few flights the numbers less the parameters.
+        Its degrees of freedom are the number of flights minus 1; with few flights, the number of values minus that of the parameters.
         """
         from scipy.special import stdtrit
 

@@ -1,6 +1,5 @@
 """Findings about how a motion was recorded: the order of its quaternions, the frame of its spins, missing and repeated frames."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -9,7 +8,6 @@ import numpy as np
 from dropspin.comparisons.logs.flight import FEWEST_FRAMES, SURPRISING, surprise
 from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.log import UPRIGHT, Header, Irregularity, Log, Toss
-from dropspin.comparisons.logs.noise import Noise
 from dropspin.comparisons.logs.rest import level_share
 from dropspin.comparisons.logs.rotors import rotation
 from dropspin.scenarios.rotations import conjugate, length, multiply, rotate, unrotate
@@ -55,10 +53,9 @@ def of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
         (0, True, f'rotation = "{inverse}"'),
         (rolled, True, f'quaternion = "{other}", rotation = "{inverse}"'),
     ):
-        tosses = tuple(_read_as(toss, log.header, roll, turned) for toss in log.tosses)
-        read = replace(log, tosses=tosses)
-        by_name = {toss.name: toss for toss in tosses}
-        some = [replace(flight, toss=by_name[flight.toss.name]) for flight in flights.found[:MOST_ROTORS]] if not is_ball else []
+        read = replace(log, tosses=tuple(_read_as(toss, log.header, roll, turned) for toss in log.tosses))
+        tried = flights.found[:MOST_ROTORS] if not is_ball else []
+        some = [replace(flight, toss=_read_as(flight.toss, log.header, roll, turned)) for flight in tried]
         again = _restlessness([rotation(flight, inertia).samples.values for flight in some]) if some else turns
         share, _ = level_share(read)
         if (count >= 3 and level < 0.7 and share > 0.9 and again < 2.0 * turns) or (again < 0.4 * turns and not share < 0.9 * level):
@@ -117,12 +114,10 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
             cure="record from the release on",
         )
     for flight, weight in zip(flights.found, flights.moving.weights, strict=True):
-        noise = flights.moving.noise
-        own = Noise(noise.white / math.sqrt(min(weight, 1.0)), noise.slow / math.sqrt(min(weight, 1.0)))
-        dt = float(np.median(np.diff(flight.toss.t)))
+        own, dt = flights.moving.noise.of_weight(min(weight, 1.0)), float(np.median(np.diff(flight.toss.t)))
+        # The last frame of a flight was left out before an impact; the frame after it is the first one that is not of the flight.
+        frames = range(flight.end + 1, min(flight.end + 4, len(flight.toss)))
         for missing in (1, 2, 3):
-            # The last frame of a flight was left out before an impact; the frame after it is the first one that is not of the flight.
-            frames = range(flight.end + 1, min(flight.end + 4, len(flight.toss)))
             if len(frames) == 3 and all(surprise(flight, frame, flights.moving.values, own, missing * dt) < SURPRISING for frame in frames):
                 yield Finding(
                     "frame dropped",

@@ -1,9 +1,10 @@
 """Tosses as engines continue them from the end of their flights, seen in the frames of the recording."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,8 +12,10 @@ from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.logs.flights import Flights, Start, flights_of
 from dropspin.comparisons.logs.intervals import FEWEST
 from dropspin.comparisons.logs.log import Header, Log, load_log
-from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.recording import record_batch, verify_accepted
+from dropspin.comparisons.running.inputs import EngineEntry, ignore
+from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown, record_batch, verify_accepted
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.loading import from_mapping
 from dropspin.scenarios.model import TOUCHING
@@ -22,6 +25,7 @@ from dropspin.scenarios.text import counted
 from dropspin.scenarios.truths.flight import flight_states
 from dropspin.scenarios.variations import whole_steps
 
+Result = TypeVar("Result")
 STEPS_PER_FRAME = 4
 """Time steps of an engine between two frames: at 148 Hz, 1.69 ms."""
 WHOLE = 1e-6
@@ -130,6 +134,21 @@ def launches(scene: Scenario, starts: Sequence[Start], states: Array, dt: float,
             [found[row]] = flight_states(states[row], scene.body.inertia_tensor, scene.acceleration)(np.array([-steps * dt]))
         frames.append(_from(start, t, most) - t[start.frame] + steps * dt)
     return Launches(found, _padded(frames))
+
+
+def of_each_engine(
+    entries: Sequence[EngineEntry],
+    work: Callable[[EngineEntry, EngineProcesses, Callable[[str], None]], Result | Breakdown],
+    on_progress: Callable[[str, float], None] | None,
+    resources: ResourceLimits,
+    jobs: int | None,
+) -> tuple[dict[str, Result], dict[str, str]]:
+    """What some work gives for each engine, by label, and the reasons of those that broke down."""
+    with started_crews(jobs, len(entries), entries, resources) as crews:
+        results = results_in_parallel(entries, work, crews, on_progress or ignore)
+    labelled = {entry.label: result for entry, result in zip(entries, results, strict=True)}
+    found = {label: result for label, result in labelled.items() if not isinstance(result, Breakdown)}
+    return found, {label: result.reason for label, result in labelled.items() if isinstance(result, Breakdown)}
 
 
 def poses(entry: EngineEntry, scenes: Sequence[Scenario], launched: Launches, dt: float) -> Array:

@@ -1,10 +1,13 @@
 """Flights in recordings that are made by formula, whose parameters, starts and noise are known."""
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 import pytest
 from support.tosses import BRICK, CUBE, made
 
 from dropspin.comparisons.logs.flights import Flights, flights_of
+from dropspin.comparisons.logs.log import Log
 from dropspin.comparisons.logs.noise import Noise
 from dropspin.scenarios.rotations import rotation_vector
 from dropspin.scenarios.state import Array
@@ -13,17 +16,17 @@ DOWN = np.array([0.0, -9.81, 0.0])
 OFFSET = (0.001, -0.002, 0.003)
 
 
-def found(log: object) -> Flights:
-    flights = flights_of(log, DOWN)  # type: ignore[arg-type]
+def found(log: Log) -> Flights:
+    flights = flights_of(log, DOWN)
     assert flights is not None
     return flights
 
 
-def misses(flights: Flights, exact: object) -> Array:
-    """Starts less the exact states, in standard deviations of the starts, shape (tosses, 12)."""
+def misses(flights: Flights, exact: Sequence[Callable[[float], Array]]) -> Array:
+    """Starts minus the exact states, in standard deviations of the starts, shape (tosses, 12)."""
     rows = []
     for start in flights.starts():
-        state = exact[int(start.toss.name)](start.toss.t[start.frame])  # type: ignore[index]
+        state = exact[int(start.toss.name)](start.toss.t[start.frame])
         turned = rotation_vector(state[3:7], start.state[3:7])
         error = np.concatenate([start.state[:3] - state[:3], turned, start.state[7:] - state[7:]])
         rows.append(error / np.sqrt(np.diag(start.covariance)))

@@ -3,6 +3,7 @@
 import gc
 import importlib.util
 import os
+import shutil
 from collections.abc import Callable
 from itertools import compress
 from pathlib import Path
@@ -20,9 +21,10 @@ WITH_PYBULLET = {"core_run", "repository", "engine_coverage"}
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the tests that use PyBullet where it is not installed; it has wheels for Python 3.11 alone."""
-    if importlib.util.find_spec("pybullet") is None:
-        left_out = [uses_pybullet(item) for item in items]
+    """Leave out the tests that use PyBullet, or Node.js, where it is not installed; PyBullet has wheels for Python 3.11 alone."""
+    lacks_pybullet, lacks_node = importlib.util.find_spec("pybullet") is None, shutil.which("node") is None
+    if lacks_pybullet or lacks_node:
+        left_out = [(lacks_pybullet and uses_pybullet(item)) or (lacks_node and uses_node(item)) for item in items]
         config.hook.pytest_deselected(items=list(compress(items, left_out)))
         items[:] = [item for item, is_left_out in zip(items, left_out, strict=True) if not is_left_out]
 
@@ -32,6 +34,11 @@ def uses_pybullet(item: pytest.Item) -> bool:
     assert isinstance(item, pytest.Function)
     names = {*item.fixturenames, *item.function.__code__.co_names}
     return bool(WITH_PYBULLET & names) or "pybullet" in item.path.read_text(encoding="utf-8").lower()
+
+
+def uses_node(item: pytest.Item) -> bool:
+    """Whether a test's module starts Node.js."""
+    return "tiny_engine" in item.path.read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="session", autouse=True)

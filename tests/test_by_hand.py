@@ -18,7 +18,8 @@ PACKAGES = {
     "check_mujoco_warp.py": {"mujoco", "mujoco_warp", "warp"},
 }
 """The engine's packages that each program imports."""
-JAVASCRIPT = "check_rapier_js.mjs"
+JAVASCRIPT = {"check_rapier_js.mjs": "@dimforge/rapier3d-compat", "check_cannon_es.mjs": "cannon-es"}
+"""The package of each program in JavaScript."""
 
 
 def imported(program):
@@ -34,17 +35,19 @@ def test_program_imports_its_engine_without_dropspin(program):
     assert imported(program) - {"numpy", "scipy", *sys.stdlib_module_names} == PACKAGES[program]
 
 
-def test_program_in_javascript_imports_its_engine_alone():
+@pytest.mark.parametrize(("program", "package"), JAVASCRIPT.items())
+def test_program_in_javascript_imports_its_engine_alone(program, package):
     """Its other imports are modules of Node.js."""
-    text = (DOCS / "by_hand" / JAVASCRIPT).read_text(encoding="utf-8")
+    text = (DOCS / "by_hand" / program).read_text(encoding="utf-8")
     assert re.findall(r"^import .* from \"(?!node:)", text, re.MULTILINE) == []
-    assert re.findall(r"\"(@[^\"]+)\"", text) == ["@dimforge/rapier3d-compat"]
+    assert re.findall(r"^const NAME = \"(.+)\";$", text, re.MULTILINE) == [package]
+    assert "found.resolve(NAME)" in text
 
 
 def test_page_on_engines_links_every_program():
     page = (DOCS / "engines.md").read_text(encoding="utf-8")
     programs = [path.name for path in (DOCS / "by_hand").iterdir() if path.suffix in (".py", ".mjs")]
-    assert sorted(programs) == sorted([*PACKAGES, JAVASCRIPT])
+    assert sorted(programs) == sorted([*PACKAGES, *JAVASCRIPT])
     assert [name for name in programs if f"](by_hand/{name})" not in page] == []
 
 

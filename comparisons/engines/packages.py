@@ -11,6 +11,9 @@ from pathlib import Path
 Version = tuple[int, ...]
 
 RAPIER_JS = "@dimforge/rapier3d-compat"
+CANNON_ES = "cannon-es"
+UNSCOPED = frozenset({CANNON_ES})
+"""Packages of npm whose names have no scope."""
 
 _distribution_version = cache(metadata.version)
 """Cached, because each query parses its metadata."""
@@ -39,8 +42,8 @@ def formatted(version: Version) -> str:
 
 
 def is_npm(package: str) -> bool:
-    """Whether a package is one of npm: the names of those that engines use have a scope, as in `@dimforge/rapier3d-compat`."""
-    return package.startswith("@")
+    """Whether a package is one of npm: its name has a scope, as in `@dimforge/rapier3d-compat`, or is known."""
+    return package.startswith("@") or package in UNSCOPED
 
 
 def npm_package(package: str) -> Path:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissing
 from dropspin.comparisons.engines.exceptions import described
-from dropspin.comparisons.engines.packages import RAPIER_JS, is_npm, npm_package
+from dropspin.comparisons.engines.packages import CANNON_ES, RAPIER_JS, is_npm, npm_package
 from dropspin.scenarios.errors import DropspinError, UnknownName
 from dropspin.scenarios.model import EARLIER_NAMES
 from dropspin.scenarios.validation import shown
@@ -32,13 +32,15 @@ GROUP = "dropspin.engines"
 """The entry-point group in which other packages register engines: name = "module:Class"."""
 FOLDER = "dropspin.comparisons.engines"
 WHEELS = "(it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere it needs a compiler)"
+WHERE = "in the working folder or a folder above it"
 BUILT_IN = {"wang": _Home(f"{FOLDER}.wang", "Wang")} | {
     name: _Home(f"{FOLDER}.{name.replace('-', '_')}_engine", adapter, package, *how_to_install or [f"pip install 'dropspin[{name}]'"])
     for name, adapter, package, *how_to_install in (
         ("mujoco", "MuJoCo", "mujoco", "pip install mujoco"),
         ("pybullet", "PyBullet", "pybullet", f"pip install pybullet {WHEELS}"),
         ("rapier", "Rapier", "rapier3d"),
-        ("rapier-js", "RapierJS", RAPIER_JS, f"npm install {RAPIER_JS}, in the working folder or a folder above it"),
+        ("rapier-js", "RapierJS", RAPIER_JS, f"npm install {RAPIER_JS}, {WHERE}"),
+        ("cannon-es", "CannonES", CANNON_ES, f"npm install {CANNON_ES}, {WHERE}"),
         ("dart", "Dart", "dartpy"),
         ("drake", "Drake", "pydrake"),
         ("sapien", "Sapien", "sapien"),

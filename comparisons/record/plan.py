@@ -21,7 +21,7 @@ class Releases(Table):
     """The releases of one engine.
 
     Attributes:
-        package: The name on PyPI, or on npm with its scope.
+        package: The name on PyPI or npm.
         together: Another package, of which the same release is installed; empty if there is none.
         extra: The extra with which the package is installed; empty for none.
         oldest: The first release to measure.

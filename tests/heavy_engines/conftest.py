@@ -9,12 +9,6 @@ def pytest_addoption(parser):
     parser.addoption("--engine", required=True, help="the engine's name, as in `dropspin list engines`")
 
 
-def pytest_ignore_collect(collection_path, config):
-    """Tests of one engine alone are in a file of its name; None leaves the decision to pytest."""
-    own = f"test_{config.getoption('engine').replace('-', '_')}.py"
-    return True if collection_path.suffix == ".py" and collection_path.name not in (own, "test_adapters.py") else None
-
-
 def pytest_report_header():
     """The versions that are tested."""
     return ", ".join(f"{package} {version}" for package, version in versions().items() if version)

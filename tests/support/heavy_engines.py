@@ -42,5 +42,6 @@ CASES = {
     ],
     "genesis": [Case("genesis[precision=float64]", 8.35e-8, None)],
     "rapier-js": [Case("rapier-js", 2.8e-4, 1e-6, batch=None)],
+    "cannon-es": [Case("cannon-es", 0.142, 1e-9, batch=None)],
     "sapien": [Case("sapien", 2.8e-4, 2.5e-3, batch=None)],
 }

@@ -18,7 +18,8 @@ def _copied(folder):
 @pytest.mark.parametrize(
     ("adapter", "changed"),
     [
-        ("rapier_js_engine.py", "rapier_js_node.cjs"),
+        ("rapier_js_engine.py", "rapier_js_engine.cjs"),
+        ("rapier_js_engine.py", "node_process.cjs"),
         ("rapier_js_engine.py", "rapier_scenes.py"),
         ("mujoco_engine.py", "mujoco_engine.py"),
         ("mjx_engine.py", "mujoco_model.py"),
@@ -33,7 +34,12 @@ def test_a_changed_file_of_an_adapter_is_another_engine(tmp_path, adapter, chang
 
 @pytest.mark.parametrize(
     ("adapter", "changed"),
-    [("rapier_engine.py", "rapier_js_engine.py"), ("mujoco_engine.py", "mujoco_warp_engine.py"), ("mujoco_engine.py", "base.py")],
+    [
+        ("rapier_engine.py", "rapier_js_engine.py"),
+        ("rapier_js_engine.py", "cannon_es_engine.cjs"),
+        ("mujoco_engine.py", "mujoco_warp_engine.py"),
+        ("mujoco_engine.py", "base.py"),
+    ],
 )
 def test_a_changed_file_of_another_engine_is_the_same(tmp_path, adapter, changed):
     _copied(tmp_path)

@@ -314,6 +314,7 @@ def test_the_plan_names_engines_with_canonical_labels():
     assert plan.engines["pybullet"].requirements("3.2.6") == ["pybullet==3.2.6", "numpy<2", "pandas<3"]
     assert plan.engines["pybullet"].requirements("3.2.7") == ["pybullet==3.2.7"]
     assert plan.engines["rapier-js"].requirements("0.20.0") == ["@dimforge/rapier3d-compat@0.20.0"]
+    assert plan.engines["cannon-es"].requirements("0.20.0") == ["cannon-es@0.20.0"]
     assert plan.scenes_of("mjx") == ("drop-ball", "spin-dzhanibekov")
     assert plan.scenes_of("dart") == plan.scenes
     assert len({plan.digest(name) for name in plan.engines}) == len(plan.engines)  # each loads its scenes

@@ -1,7 +1,7 @@
-"""Node.js with Rapier in it, for the engine `rapier-js`: a process that takes requests of the driver's functions, and returns states.
+"""Node.js with an engine in it: a process that takes requests of the functions in node_process.cjs, and returns states.
 
-It starts with the first simulation and ends with Python: loading Rapier takes half a second, and V8 compiles it further in the first
-thousands of steps.
+It starts with the first simulation and ends with Python: loading an engine takes up to half a second, and V8 compiles it further in the
+first thousands of steps.
 """
 
 import atexit
@@ -16,16 +16,21 @@ from typing import Any
 import numpy as np
 
 from dropspin.comparisons.engines.base import Array
-from dropspin.comparisons.engines.packages import RAPIER_JS, npm_package
+from dropspin.comparisons.engines.packages import npm_package
 
-DRIVER = Path(__file__).with_suffix(".cjs")
+BRIDGE = Path(__file__).with_suffix(".cjs")
 
 
 class Node:
-    """A process of Node.js that has loaded Rapier; it also ends when this process does, as its input ends then."""
+    """A process of Node.js that has loaded an engine; it also ends when this process does, as its input ends then.
 
-    def __init__(self) -> None:
-        self._process = Popen(["node", str(DRIVER)], stdin=PIPE, stdout=PIPE, stderr=DEVNULL)
+    Args:
+        driver: The file that builds worlds of the engine.
+        home: The folder of the engine's package.
+    """
+
+    def __init__(self, driver: Path, home: Path) -> None:
+        self._process = Popen(["node", str(BRIDGE)], stdin=PIPE, stdout=PIPE, stderr=DEVNULL)
         atexit.register(self.end)
         if sys.platform == "linux":
             import resource
@@ -34,7 +39,7 @@ class Node:
             for limit in (resource.RLIMIT_AS, resource.RLIMIT_CPU):
                 _, most = resource.prlimit(self._process.pid, limit)
                 resource.prlimit(self._process.pid, limit, (most, most))
-        self.version = self.ask("load", home=str(npm_package(RAPIER_JS)))[0]["version"]
+        self.version = self.ask("load", driver=str(driver), home=str(home))[0]["version"]
 
     @property
     def pid(self) -> int:
@@ -52,7 +57,7 @@ class Node:
         self._process.communicate()
 
     def ask(self, todo: str, **given: Any) -> tuple[dict[str, Any], Array]:
-        """What a function of the driver returns, and states, shape (n, 13).
+        """What a function of the bridge returns, and states, shape (n, 13).
 
         Raises:
             RuntimeError: The function failed, or the process ended; then it has ended in any case.
@@ -76,12 +81,17 @@ class Node:
             raise
 
 
-_nodes: dict[int, Node] = {}
-"""By the process that started it: a forked process must not share one."""
+_nodes: dict[tuple[int, Path], Node] = {}
+"""By the process that started it, because a forked process must not share one, and by driver."""
 
 
-def node() -> Node:
-    """This process's Node.js."""
-    if os.getpid() not in _nodes or _nodes[os.getpid()].has_ended:
-        _nodes[os.getpid()] = Node()
-    return _nodes[os.getpid()]
+def node(driver: Path, package: str) -> Node:
+    """This process's Node.js with a package of npm, driven by a file.
+
+    Raises:
+        PackageNotFoundError: The package is not installed.
+    """
+    key = os.getpid(), driver
+    if key not in _nodes or _nodes[key].has_ended:
+        _nodes[key] = Node(driver, npm_package(package))
+    return _nodes[key]

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
 from dropspin.comparisons.regressions.comparing import History
 from dropspin.comparisons.results.folder import SECTION, file_name, read_stored
@@ -38,12 +38,17 @@ def write_parquet(study: Study, folder: Path) -> None:
 
 def write_scenes(scenes: Iterable[Scenario], folder: Path) -> None:
     """Write scenes as TOML files, each by its name, into a new folder."""
-    import tomlkit
-
     folder.mkdir()
     for scene in scenes:
-        values = scene.model_dump(mode="json", exclude_none=True, exclude={"name", "summary", "source", "tags", "expect"})
-        (folder / f"{file_name(scene.name)}.toml").write_text(tomlkit.dumps(values), encoding="utf-8")
+        write_toml(scene, folder / f"{file_name(scene.name)}.toml", leave_out={"name", "summary", "source", "tags", "expect"})
+
+
+def write_toml(model: BaseModel, file: Path, leave_out: set[str] | None = None) -> None:
+    """Write a scene or a header as TOML."""
+    import tomlkit
+
+    values = model.model_dump(mode="json", exclude_none=True, exclude=leave_out)
+    file.write_text(tomlkit.dumps(values), encoding="utf-8")
 
 
 def write_history(history: History, folder: Path) -> Document:

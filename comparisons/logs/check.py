@@ -1,7 +1,7 @@
 """What a recording says about itself, from free flight and from rest: units, axes, rate, gravity, centre of mass, inertia, drag.
 
-A finding is a value that differs from the header's by more than noise does once in 10,000 sound recordings. Where the motion alone cannot
-tell two causes apart, both are alternatives, and what separates them is said.
+A finding is a value that differs from the header's by more than noise does once in 10,000 sound recordings. It has several causes where
+neither the motion nor the frames at rest tell them apart.
 """
 
 import math
@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,36 +25,43 @@ from dropspin.comparisons.logs.flight import (
     without,
 )
 from dropspin.comparisons.logs.flights import Flights, flights_of
-from dropspin.comparisons.logs.log import LENGTHS, UPRIGHT, Log, load_log
+from dropspin.comparisons.logs.log import LENGTHS, TIMES, UPRIGHT, Cause, Finding, Header, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
-from dropspin.comparisons.logs.recorded import Finding, of_frames, of_quaternions, of_spins
+from dropspin.comparisons.logs.recorded import of_frames, of_quaternions, of_spins
 from dropspin.comparisons.logs.rest import rests
+from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import unrotate
 from dropspin.scenarios.state import Array
+from dropspin.scenarios.validation import validated
 
 ALARM = 1e-4
 """Probability of a finding where there is nothing, of each value."""
 UNIT = 0.05
 """Largest relative difference from the ratio of two units."""
-OF_TIME = {1e-6: "times are in ms", 0.25: "the rate is half of the true one", 4.0: "the rate is twice the true one"}
-"""Ratios of gravity to the true one, and what gives them."""
+RATES = (0.5, 2.0)
+"""Rates over the true one that are tried."""
 MOST_LOG = 700.0
 """Logarithm near that of the largest number: intervals that are wider are not determined."""
-USEFUL = {"centre of mass": 0.1, "ratio of inertia": 0.1, "drag": 0.5}
-"""Half widths of intervals beyond which a value counts as not identifiable: a share of the size, a share, and 1/s."""
+OF_SIZE, OF_RATIO, OF_DRAG = 0.1, 0.1, 0.5
+"""Half widths of intervals beyond which a value counts as not identifiable: a share of the size, a logarithm, and [1/s]."""
 
 
 @dataclass(frozen=True)
 class Value:
-    """A value with its 95 % interval; `note` says what would make it identifiable where it is not, and is None where it is."""
+    """A value with its 95 % interval; it is not identifiable if the half width of that is larger than `useful`."""
 
     name: str
     value: float
     low: float
     high: float
     unit: str
-    note: str | None = None
+    useful: float = math.inf
+
+    @property
+    def half_width(self) -> float:
+        """Of the interval."""
+        return 0.5 * (self.high - self.low)
 
 
 @dataclass(frozen=True)
@@ -76,16 +84,26 @@ class Check:
     flights: Flights
 
     @property
+    def corrected(self) -> Header:
+        """The header with the keys of each finding that has one cause."""
+        content = self.flights.log.header.model_dump()
+        for finding in self.findings:
+            if len(finding.causes) == 1:
+                for key, value in finding.causes[0].keys.items():
+                    (content["body"] if key.startswith("body.") else content)[key.removeprefix("body.")] = value
+        return validated(Header, "corrected header", content)
+
+    @property
     def reads_the_columns_right(self) -> bool:
         """Whether units, axes and quaternions are what the header says, but for an error of the scale."""
         return not any(finding.kind in ("up", "unit", "quaternion") for finding in self.findings)
 
 
-def log_check(recording: Log | str | Path) -> Check:
+def log_check(recording: Flights | Log | str | Path) -> Check:
     """What the flights and the rests of a recording say about its header.
 
     Args:
-        recording: The recording, or what `load_log` takes.
+        recording: The recording, what `load_log` takes, or the flights found in it.
 
     Returns:
         Its values with their intervals, its findings, and its tosses.
@@ -93,21 +111,24 @@ def log_check(recording: Log | str | Path) -> Check:
     Raises:
         DropspinError: It cannot be loaded, or no toss has a free flight.
     """
-    log = recording if isinstance(recording, Log) else load_log(recording)
-    down = np.array([0.0, -log.header.gravity, 0.0])
-    acceleration = _acceleration(log, down)
-    flights = flights_of(log, acceleration)
+    flights = recording if isinstance(recording, Flights) else _flights(recording if isinstance(recording, Log) else load_log(recording))
+    drag = _drag(flights)
+    found = [*_of_units(flights), *of_quaternions(flights.log, flights), *of_spins(flights), *of_frames(flights)]
+    check = Check(tuple(_values(flights, drag)), tuple(found), tuple(_tosses(flights)), flights)
+    if not check.reads_the_columns_right:
+        return check
+    return replace(check, findings=(*found, *_of_scale(flights), *_of_offset(flights), *_of_inertia(flights, drag)))
+
+
+def _flights(log: Log) -> Flights:
+    """The flights of a recording, of whatever acceleration."""
+    flights = flights_of(log, _acceleration(log, np.array([0.0, -log.header.gravity, 0.0])))
     if flights is None:
         raise DropspinError(
             f"{log.origin}: no toss has {FEWEST_FRAMES} frames of free flight with one acceleration; film from the release on, and give "
             "the rate of the frames."
         )
-    drag = _drag(flights)
-    found = [*_of_units(flights), *of_quaternions(log, flights), *of_spins(flights), *of_frames(flights)]
-    check = Check(tuple(_values(flights, drag)), tuple(found), tuple(_tosses(flights)), flights)
-    if not check.reads_the_columns_right:
-        return check
-    return replace(check, findings=(*found, *_of_scale(flights), *_of_offset(flights), *_of_inertia(flights, drag)))
+    return flights
 
 
 def _acceleration(log: Log, down: Array) -> Array:
@@ -119,7 +140,8 @@ def _acceleration(log: Log, down: Array) -> Array:
 
     if 2 * falling(down) > len(log.tosses):
         return down
-    factors = {a / b for a, b in product(LENGTHS.values(), repeat=2)} | {1e6, *OF_TIME}
+    lengths, times = ({a / b for a, b in product(units.values(), repeat=2)} for units in (LENGTHS, TIMES))
+    factors = lengths | {ratio**2 for ratio in (*times, *RATES)}
     candidates = [factor * sign * np.roll(down, turn) for factor in sorted(factors) for turn in range(3) for sign in (1.0, -1.0)]
     candidates += [of_toss[0] for of_toss in pieces]
     return max([down, *candidates], key=falling)
@@ -137,90 +159,89 @@ def _of_units(flights: Flights) -> Iterator[Finding]:
     axis = int(np.argmax(np.abs(recorded)))
     up = ("-" if recorded[axis] < 0.0 else "") + "xyz"[axis]
     if up != header.up:
-        yield Finding("up", f"bodies fall along {_opposite(up)}, the header says up = {header.up!r}", cure=f'up = "{up}"')
+        yield Finding("up", causes=(Cause("upward axis", keys={"up": up}),))
     if abs(ratio - 1.0) > UNIT:
         lengths = [unit for unit, value in LENGTHS.items() if abs(ratio * value / LENGTHS[header.length_unit] - 1.0) < UNIT]
-        alternatives = [f"lengths are in {unit}" for unit in lengths]
-        alternatives += [what for factor, what in OF_TIME.items() if abs(ratio / factor - 1.0) < UNIT]
-        cure = f'length_unit = "{lengths[0]}"' if lengths else f"a rate divided by {math.sqrt(ratio):.4g}"
-        yield Finding(
-            "unit",
-            f"gravity is {float(np.linalg.norm(found)):.4g} m/s²",
-            tuple(alternatives)
-            or (f"lengths are {ratio:.4g} times the true ones", f"the rate is {math.sqrt(ratio):.4g} times the true one"),
-            cure,
-            "the height at rest on a known face, or a length in the record",
-        )
+        causes = [Cause("length unit", keys={"length_unit": unit}) for unit in lengths]
+        causes += [Cause("time unit", keys={"time_unit": unit}) for unit, value in TIMES.items() if _is_time(ratio, header, value)]
+        causes += [_rate_cause(flights.log, rate**2) for rate in RATES if abs(ratio / rate**2 - 1.0) < UNIT]
+        both = [_length_cause(header, ratio), _rate_cause(flights.log, ratio)]
+        yield Finding("unit", ratio * header.gravity, header.gravity, causes=tuple(causes or both))
 
 
-def _opposite(axis: str) -> str:
-    return axis[1:] if axis.startswith("-") else f"-{axis}"
+def _is_time(ratio: float, header: Header, unit: float) -> bool:
+    """Whether times are in a unit [s] instead of the header's, so that gravity has a ratio to the true one."""
+    return abs(ratio * (unit / TIMES[header.time_unit]) ** -2 - 1.0) < UNIT
+
+
+def _length_cause(header: Header, ratio: float) -> Cause:
+    return Cause("length scale", ratio - 1.0, {"length_scale": float(f"{ratio * header.length_scale:.4g}")})
+
+
+def _rate_cause(log: Log, ratio: float) -> Cause:
+    """A wrong rate, in the header or in the times."""
+    faster, rate = math.sqrt(ratio), 1.0 / float(np.median(np.concatenate([np.diff(toss.t) for toss in log.tosses])))
+    return Cause("rate", faster - 1.0, {"rate": float(f"{rate / faster:.4g}")} if log.header.rate is not None else {})
 
 
 def _of_scale(flights: Flights) -> Iterator[Finding]:
     """Of gravity that is a little too large or small, or not vertical."""
     header, found = flights.log.header, flights.moving
-    x, fall, z = found.values[ACCELERATION]
+    x, fall, z = found.values[ACCELERATION].tolist()
     wide = _half_widths(found)
     ratio, error = -fall / header.gravity, wide[1] / header.gravity
     if abs(ratio - 1.0) > error:
-        by_length = f"lengths are {abs(ratio - 1.0):.1%} {'short' if ratio < 1.0 else 'long'}"
-        by_rate = f"the rate is {abs(1.0 / math.sqrt(ratio) - 1.0):.1%} {'low' if ratio < 1.0 else 'high'}"
-        scaled, rated = f"length_scale = {ratio * header.length_scale:.4g}", f"rate = {_rate(flights.log) / math.sqrt(ratio):.4g}"
         at_rest, spread, _, _ = rests(flights.log).scale()
-        near = [abs(at_rest - expected) < 4.0 * spread + 0.004 for expected in (ratio, 1.0)]
-        separates = f"heights at rest are {at_rest:.4g} of the expected ones"
-        if near == [True, False]:
-            yield Finding("scale", by_length, (), scaled, separates)
-        elif near == [False, True]:
-            yield Finding("rate", by_rate, (), rated, separates)
-        else:
-            heard = "a resting height on a known face, or the rate of the camera by a clock in the picture"
-            yield Finding("scale", f"gravity is {-fall:.4g} m/s²", (by_length, by_rate), f"{scaled}, or {rated}", heard)
+        by_length, by_rate = (abs(at_rest - expected) < 4.0 * spread + 0.004 for expected in (ratio, 1.0))
+        causes = _shown((_length_cause(header, ratio), by_length), (_rate_cause(flights.log, ratio), by_rate))
+        yield Finding("scale", -fall, header.gravity, causes=causes, rests=at_rest)
     if math.hypot(x, z) > math.hypot(wide[0], wide[2]):
-        angle = math.degrees(math.atan2(math.hypot(x, z), -fall))
-        yield Finding("tilt", f"gravity is {angle:.2g}° from the upward axis", ("the axes are tilted", "something pushes sideways"))
+        yield Finding("tilt", math.atan2(math.hypot(x, z), -fall), 0.0, causes=(Cause("axes"), Cause("push")))
 
 
-def _rate(log: Log) -> float:
-    return 1.0 / float(np.median(np.concatenate([np.diff(toss.t) for toss in log.tosses])))
+def _shown(*causes: tuple[Cause, bool]) -> tuple[Cause, ...]:
+    """The causes that the frames at rest show, or all if they show none."""
+    return tuple(cause for cause, is_shown in causes if is_shown) or tuple(cause for cause, _ in causes)
 
 
 def _of_offset(flights: Flights) -> Iterator[Finding]:
     """Of a centre of mass that is not where the header says."""
     header, found = flights.log.header, flights.moving
     off = np.asarray(header.tracked_point) - header.body.centre - found.values[OFFSET]
-    if (np.abs(off) > _half_widths(found)[OFFSET]).any():
-        centre, tracked = header.body.centre + off, np.asarray(header.tracked_point) - off
-        what = f"the tracked point turns about a point {1e3 * np.linalg.norm(off):.2g} mm from the centre of mass given"
-        mass = f"the centre of mass is at {_listed(centre)} m"
-        point = f"the tracked point is at {_listed(tracked)} m"
+    is_off = np.abs(off) > _half_widths(found)[OFFSET]
+    if is_off.any():
         _, _, moved, error = rests(flights.log).scale()
-        seen = np.isfinite(moved) & (np.abs(off) > _half_widths(found)[OFFSET])
-        # δ is the error of the tracked point: -off if that is the cause, 0 if the centre of mass is.
-        by_point = seen.any() and bool((np.abs(moved + off) < 4.0 * error + 0.2 * np.abs(off))[seen].all())
-        by_mass = seen.any() and bool((np.abs(moved) < 4.0 * error + 0.2 * np.abs(off))[seen].all())
-        where = f"heights at rest on opposite faces differ by {2e3 * float(np.abs(moved[seen]).max()):.2g} mm" if seen.any() else ""
-        if by_mass != by_point:
-            cure = f"[body] center_of_mass = {_listed(centre)}" if by_mass else f"tracked_point = {_listed(tracked)}"
-            yield Finding("centre of mass" if by_mass else "tracked point", f"{what}: {mass if by_mass else point}", (), cure, where)
-        else:
-            cure = f"[body] center_of_mass = {_listed(centre)}, or tracked_point = {_listed(tracked)}"
-            yield Finding("centre of mass", what, (mass, point), cure, "heights at rest on opposite faces")
+        seen, allowed = np.isfinite(moved) & is_off, 4.0 * error + 0.2 * np.abs(off)
+        # δ is the error of the tracked point: 0 if the centre of mass is the cause, -off if the point is.
+        by_mass, by_point = (bool(seen.any() and (np.abs(moved - wrong) < allowed)[seen].all()) for wrong in (0.0, -off))
+        inertia = {} if isinstance(header.body.inertia, tuple) else {"body.inertia": _moments(header.body.inertia_tensor)}
+        keys = {"body.center_of_mass": _rounded(header.body.centre + off)} | inertia
+        point = {"tracked_point": _rounded(np.asarray(header.tracked_point) - off)}
+        causes = _shown((Cause("centre of mass", keys=keys), by_mass), (Cause("tracked point", keys=point), by_point))
+        opposite = 2.0 * float(np.abs(moved[seen]).max()) if seen.any() else math.nan
+        yield Finding("centre of mass", float(np.linalg.norm(off)), 0.0, causes=causes, rests=opposite)
 
 
-def _listed(values: Array) -> str:
-    return "[" + ", ".join(f"{value:.4f}" for value in values) + "]"
+def _rounded(values: Array) -> list[float]:
+    return [round(value, 4) for value in values.tolist()]
+
+
+def _moments(inertia: Array) -> list[Any]:
+    """A tensor of inertia as a header has it: three moments, or rows."""
+    found: list[Any] = (np.diag(inertia) if is_diagonal(inertia) else inertia).tolist()
+    return found
 
 
 def _of_inertia(flights: Flights, drag: Regression) -> Iterator[Finding]:
     """Of ratios of moments of inertia that differ from the header's, and of drag."""
-    found = flights.turning
-    for name, value, wide in zip(("I_x / I_y", "I_z / I_y"), found.values, _half_widths(found), strict=True):
+    found, body = flights.turning, flights.log.header.body
+    stretched = np.exp(0.5 * np.array([found.values[0], 0.0, found.values[1]]))
+    keys = {"body.inertia": _moments(body.inertia_tensor * np.outer(stretched, stretched))}
+    for kind, value, wide in zip(("inertia, x", "inertia, z"), found.values, _half_widths(found), strict=True):
         if abs(value) > max(wide, 0.01):
-            yield Finding("inertia", f"{name} is {math.exp(value):.3g} times that of the header", cure="[body] inertia")
+            yield Finding(kind, math.exp(value), 1.0, causes=(Cause("moments of inertia", keys=keys),))
     if drag.values[-1] > _half_widths(drag)[-1]:
-        yield Finding("drag", f"the speed decays at {drag.values[-1]:.2g} 1/s")
+        yield Finding("drag", float(drag.values[-1]), 0.0)
 
 
 def _drag(flights: Flights) -> Regression:
@@ -232,22 +253,18 @@ def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
     """The values that flights give, each with its interval or with what it needs."""
     header, found = flights.log.header, flights.moving
     wide = found.half_widths
-    fall, error = -found.values[1], wide[1]
+    fall, error = -float(found.values[1]), float(wide[1])
     yield Value("gravity", fall, fall - error, fall + error, "m/s²")
     yield Value("length scale", fall / header.gravity, (fall - error) / header.gravity, (fall + error) / header.gravity, "")
-    tosses = len(flights.found)
     centres = np.asarray(header.tracked_point) - found.values[OFFSET]
     for axis, centre, error in zip("xyz", centres, wide[OFFSET], strict=True):
-        enough = USEFUL["centre of mass"] * header.body.size
-        needs = None if error < enough else f"about {math.ceil(tosses * (error / enough) ** 2)} such tosses, or faster ones"
-        yield Value(f"centre of mass, {axis}", centre, centre - error, centre + error, "m", needs)
+        yield Value(f"centre of mass, {axis}", centre, centre - error, centre + error, "m", OF_SIZE * header.body.size)
     turning = flights.turning
     for name, value, error in zip(("I_x / I_y", "I_z / I_y"), turning.values, turning.half_widths, strict=True):
         low, middle, high = (math.exp(min(value + step, MOST_LOG)) for step in (-error, 0.0, error))
-        needs = None if error < USEFUL["ratio of inertia"] else "tosses of 0.3 s that spin at 8 rad/s or more, about different axes"
-        yield Value(f"{name} over the header's", middle, low, high, "", needs)
+        yield Value(f"{name} over the header's", middle, low, high, "", middle * math.sinh(OF_RATIO))
     rate, error = drag.values[-1], drag.half_widths[-1]
-    yield Value("drag", rate, rate - error, rate + error, "1/s", None if error < USEFUL["drag"] else "longer flights")
+    yield Value("drag", rate, rate - error, rate + error, "1/s", OF_DRAG)
     for name, noise, unit in (("position", found.noise, "m"), ("orientation", turning.noise, "rad")):
         yield Value(f"white noise of {name}", noise.white, math.nan, math.nan, unit)
         yield Value(f"slow noise of {name}", noise.slow, math.nan, math.nan, f"{unit}/s^1.5")

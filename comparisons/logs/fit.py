@@ -53,7 +53,7 @@ GRID, FINER = 7, 8
 MOST_GRIDS = 8
 MARGIN = 0.75
 """Of a finer grid beside the estimates of the resamples, as a share of the distance of two values of the coarser one."""
-FINE_ENOUGH = 0.2
+FINE_ENOUGH = 0.3
 """Distance of two values of a grid over the width of the estimates of 99 % of the resamples."""
 SHARE, LIMIT = 0.9, 2.0
 """The share of the tosses whose q is at most the limit, by the choice of δ; the engine that made the tosses leaves q near 1."""
@@ -254,7 +254,8 @@ def _losses(residuals: Array, derivatives: Array, variances: Array) -> tuple[Arr
     for _ in range(ROUNDS):
         q = np.mean(squares / (values + discrepancy**2), axis=2)
         best = squares[np.argmin(np.log1p(q).sum(axis=1))]
-        fits = [np.quantile(np.mean(best / (values + delta**2), axis=1), SHARE) <= LIMIT for delta in DISCREPANCIES]
+        tried = np.mean(best / (values + DISCREPANCIES[:, np.newaxis, np.newaxis] ** 2), axis=2)
+        fits = np.quantile(tried, SHARE, axis=1) <= LIMIT
         discrepancy = float(DISCREPANCIES[np.argmax(fits)])
     return np.log1p(np.mean(squares / (values + discrepancy**2), axis=2)), discrepancy
 

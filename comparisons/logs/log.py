@@ -3,10 +3,11 @@
 What the file shows by itself, without the laws of motion, are facts: rows that repeat, missing frames, uneven times, another rate.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,23 +119,42 @@ class Toss:
 
 
 @dataclass(frozen=True)
-class Irregularity:
-    """What a file shows by itself.
+class Cause:
+    """What explains a finding.
 
     Attributes:
-        kind: `repeated`: a row repeats the one before while the body moves; `gap`: frames are missing; `jitter`: the times are uneven;
-            `rate`: the times have another rate than the header.
-        toss: The name of the toss; empty for `rate`.
-        frame: The frame of the toss, from 0, at which it begins; for `jitter`, the one after the step that differs most.
-        value: The number of rows or of missing frames, the step that differs most [s], or the rate of the times [1/s].
-        expected: 0, the usual step [s], or the rate of the header [1/s].
+        name: Such as `length scale`; `reports.stories.log_check` has the words for each.
+        share: The recorded value over the true one, less 1, of a scale or a rate.
+        keys: The keys of the header that remove it, with their values; those of the body as `body.inertia`.
     """
 
-    kind: Literal["repeated", "gap", "jitter", "rate"]
-    toss: str
-    frame: int
-    value: float
-    expected: float
+    name: str
+    share: float = math.nan
+    keys: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is wrong with a recording or its header.
+
+    Attributes:
+        kind: Such as `scale`; `reports.stories.log_check` has the words for each. Of the file itself: `repeated`: a row repeats the one
+            before while the body moves; `gap`: frames are missing; `jitter`: the times are uneven; `rate`: they have another rate.
+        value: What was found [SI].
+        expected: The same by the header, or the usual value.
+        toss: The name of the toss; empty for the whole recording.
+        frame: The frame of the toss, from 0.
+        causes: Those that the recording cannot tell apart, if several.
+        rests: What the bodies at rest show of the causes: heights over the expected ones, or the difference of opposite faces [m].
+    """
+
+    kind: str
+    value: float = math.nan
+    expected: float = math.nan
+    toss: str = ""
+    frame: int | None = None
+    causes: tuple[Cause, ...] = ()
+    rests: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,13 +165,13 @@ class Log:
         header: What its header says.
         tosses: In the order of the file.
         origin: The argument of `load_log`.
-        irregularities: What the file shows by itself.
+        irregularities: What the file shows by itself: numbers of rows or of frames, the step that differs most [s], or a rate [1/s].
     """
 
     header: Header
     tosses: tuple[Toss, ...]
     origin: str
-    irregularities: tuple[Irregularity, ...]
+    irregularities: tuple[Finding, ...]
 
 
 def log_names() -> list[str]:
@@ -179,6 +199,7 @@ def load_log(recording: str | Path) -> Log:
         raise DropspinError(f"{given}: is the data of a recording; give its header, a TOML file with the keys data and [body].")
     header = validated(Header, given, with_mesh(read_toml(path, given, "recording"), path.parent))
     columns, names = read_columns(path.parent / header.data, str(Path(given).parent / header.data), header.topic)
+    header = header.model_copy(update={"data": str((path.parent / header.data).resolve())})
     where = f"{given}: data"
     if not len(names):
         raise DropspinError(f"{where}: has no rows; give a row for each frame.")
@@ -224,7 +245,7 @@ def _without_jumps(quaternions: Array) -> Array:
     return quaternions * np.cumprod(np.concatenate([[1.0], signs]))[:, None]
 
 
-def _irregularities(header: Header, tosses: list[Toss], has_times: bool) -> Iterator[Irregularity]:
+def _irregularities(header: Header, tosses: list[Toss], has_times: bool) -> Iterator[Finding]:
     """What the rows and the times show; without a column of times, the rows alone."""
     for toss in tosses:
         yield from _repeated(toss)
@@ -232,10 +253,10 @@ def _irregularities(header: Header, tosses: list[Toss], has_times: bool) -> Iter
             yield from _uneven(toss)
     rate = 1.0 / float(np.median(np.concatenate([np.diff(toss.t) for toss in tosses])))
     if has_times and header.rate is not None and abs(rate / header.rate - 1.0) > OTHER_RATE:
-        yield Irregularity("rate", "", 0, rate, header.rate)
+        yield Finding("rate", rate, header.rate, causes=(Cause("times"), Cause("rate of the header", keys={"rate": rate})))
 
 
-def _repeated(toss: Toss) -> Iterator[Irregularity]:
+def _repeated(toss: Toss) -> Iterator[Finding]:
     """Runs of equal rows between frames in which the body moves."""
     steps = length(np.diff(toss.position, axis=0))
     equal = (steps == 0.0) & (np.diff(toss.orientation, axis=0) == 0.0).all(axis=1)
@@ -243,15 +264,15 @@ def _repeated(toss: Toss) -> Iterator[Irregularity]:
     [edges] = np.nonzero(np.diff(np.concatenate([[False], equal, [False]])))
     for begin, end in edges.reshape(-1, 2):
         if begin > 0 and end < len(steps) and moves[begin - 1] and moves[end]:
-            yield Irregularity("repeated", toss.name, int(begin) + 1, float(end - begin), 0.0)
+            yield Finding("repeated", float(end - begin), 0.0, toss.name, int(begin) + 1)
 
 
-def _uneven(toss: Toss) -> Iterator[Irregularity]:
+def _uneven(toss: Toss) -> Iterator[Finding]:
     """Missing frames, and times that are not equally spaced beside them."""
     steps = np.diff(toss.t)
     missing, usual = missing_frames(steps), float(np.median(steps))
     for frame in np.flatnonzero(missing):
-        yield Irregularity("gap", toss.name, int(frame) + 1, float(missing[frame]), 0.0)
+        yield Finding("gap", float(missing[frame]), 0.0, toss.name, int(frame) + 1)
     if is_uneven(steps[missing == 0]):
         worst = int(np.argmax(np.where(missing, 0.0, np.abs(steps - usual))))
-        yield Irregularity("jitter", toss.name, worst + 1, float(steps[worst]), usual)
+        yield Finding("jitter", float(steps[worst]), usual, toss.name, worst + 1)

@@ -127,6 +127,8 @@ def study_folder(folder: str) -> Iterator[Path]:
         if files and files[-1].name == SECTION:
             (place / SECTION).unlink(missing_ok=True)
         for file in files:
+            if file.is_dir():
+                shutil.rmtree(place / file.name, ignore_errors=True)
             file.replace(place / file.name)
 
 

@@ -16,8 +16,8 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
 
     RECORDING is a header, a TOML file that names the body, the units and the file of data; or toss-cube, 100 measured tosses of a cube.
     Gravity, scale, drag, inertia and centre of mass are found from the flights alone, each with a 95 % interval, and wrong units, axes,
-    orders and rates are named with the remedy. If the header has a floor, scenes/ in the output folder has a scene of each
-    toss, from the end of its flight on, for dropspin run.
+    orders and rates are named with the remedy; corrected.toml in the output folder is the header with the remedies of which the recording
+    leaves no doubt. If the header has a floor, scenes/ beside it has a scene of each toss, from the end of its flight on, for dropspin run.
 
     Exit code: 0 no finding, 1 a finding, 2 bad input.
     """
@@ -26,7 +26,7 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
     from dropspin.comparisons.results.folder import study_folder
     from dropspin.reports.html.study import study_page
     from dropspin.reports.stories.log_check import CheckedLog
-    from dropspin.reports.study_files import write_parquet, write_scenes, write_study
+    from dropspin.reports.study_files import write_parquet, write_scenes, write_study, write_toml
     from dropspin.reports.terminal.rows import print_json_or
 
     with study_folder(output) as folder:
@@ -35,6 +35,7 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
         document = write_study(study, folder)
         write_parquet(study, folder)
         (folder / "report.html").write_text(study_page(document), encoding="utf-8")
+        write_toml(check.corrected, folder / "corrected.toml")
         if check.reads_the_columns_right and check.flights.log.header.floor is not None:
             write_scenes(scenes_of(check.flights), folder / "scenes")
     print_json_or(json_output, study.rows(), document, os.path.join(output, "report.html"))

@@ -117,7 +117,8 @@ def _run() -> int:
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         hint = f" To list what it takes: {context.command_path} --help" if context else ""
-        _say(error.format_message().rstrip(".") + f".{hint}")
+        message = error.format_message().rstrip(".")
+        _say(f"{message}{'' if message.endswith('?') else '.'}{hint}")
         return 2
     except click.Abort:  # an interrupt of a command, with its message
         raise
@@ -161,8 +162,9 @@ class _LazyGroup(click.Group):
         name = " ".join(args[:words])
         if name in MOVED:
             raise click.UsageError(f"{name} is now: dropspin {MOVED[name]}.")
-        if below := [command for command in COMMANDS if command.startswith(f"{name} ") and name not in COMMANDS]:
-            raise click.UsageError(f"{name} needs a word more: {', '.join(below)}.", ctx)
+        if name not in COMMANDS and (below := {command: line for command, line in COMMANDS.items() if command.startswith(f"{name} ")}):
+            listed = {command.removeprefix(f"{name} "): click.Command(command, short_help=line) for command, line in below.items()}
+            return name, click.Group(name, listed), args[1:]
         if name not in COMMANDS and not name.startswith("-"):
             from dropspin.scenarios import UnknownName
 

@@ -1,16 +1,18 @@
 """The output of `dropspin log check`: what the flights of a recording show, each value with its interval; then what is wrong with it."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, Literal
 
 import numpy as np
 
 from dropspin.comparisons.logs.check import Check, TossFacts, Value
-from dropspin.comparisons.logs.recorded import Finding
+from dropspin.comparisons.logs.log import Finding
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
-from dropspin.reports.stories.numbers import capitalized, formatted, grouped
+from dropspin.reports.stories.log_findings import sentence, texts
+from dropspin.reports.stories.numbers import formatted, grouped
 from dropspin.reports.stories.study import Study
 from dropspin.scenarios.text import counted
 
@@ -20,6 +22,10 @@ DIGITS = 2
 """Significant digits of the half width of an interval, to which a value is shown."""
 MOST_ALIKE = 3
 """Findings of one kind that a terminal shows."""
+SPINNING = "tosses of 0.3 s that spin at 8 rad/s or more, about different axes"
+NEEDS = {f"centre of mass, {axis}": "about {tosses} such tosses, or faster ones" for axis in "xyz"}
+NEEDS |= {"I_x / I_y over the header's": SPINNING, "I_z / I_y over the header's": SPINNING, "drag": "longer flights"}
+"""What makes a value identifiable, by its name."""
 
 
 class CheckedLog(Study):
@@ -38,7 +44,9 @@ class CheckedLog(Study):
 
     def rows(self) -> list[dict[str, Any]]:
         """Every value, every finding and every toss, each with the columns of all."""
-        rows = [{"row": kind, **asdict(row)} for kind in ("values", "findings", "tosses") for row in getattr(self, kind)]
+        rows = [{"row": "values", **asdict(value), "note": self._note(value)} for value in self.values]
+        rows += [{"row": "findings", **asdict(finding), **texts(finding)} for finding in self.findings]
+        rows += [{"row": "tosses", **asdict(toss)} for toss in self.tosses]
         columns = dict.fromkeys(name for row in rows for name in row)
         return [{name: row.get(name) for name in columns} for row in rows]
 
@@ -55,7 +63,7 @@ class CheckedLog(Study):
             f"Check of {self.recording}",
             [
                 Paragraph(head),
-                Table([_row(value) for value in self.values]),
+                Table([_row(value, self._note(value)) for value in self.values]),
                 Sentences(parts, numbered=True, on_terminal=False),
                 Sentences(brief, on_page=False),
                 Heading("Flights"),
@@ -64,14 +72,21 @@ class CheckedLog(Study):
             [Paragraph(f"{counted(len(parts), 'finding')}.")],
         )
 
+    def _note(self, value: Value) -> str | None:
+        """What would make a value identifiable; None for one that is."""
+        if not value.half_width > value.useful:
+            return None
+        flights = sum(toss.frames > 0 for toss in self.tosses)
+        return NEEDS[value.name].format(tosses=math.ceil(flights * (value.half_width / value.useful) ** 2))
 
-def _row(value: Value) -> dict[str, str]:
+
+def _row(value: Value, note: str | None) -> dict[str, str]:
     """A value with its interval; of one that is not identifiable, what it needs."""
     name, small = {"quantity": value.name}, value.unit in ("m", "rad") and abs(value.value) < SMALL
     scale, unit = (1e3, f"m{value.unit}") if small else (1.0, value.unit)
-    if value.note is not None:
-        return {**name, "value": "not identifiable", "95 % interval": f"needs {value.note}"}
-    half = 0.5 * scale * (value.high - value.low)
+    if note is not None:
+        return {**name, "value": "not identifiable", "95 % interval": f"needs {note}"}
+    half = scale * value.half_width
     if not half > 0.0:
         return {**name, "value": f"{formatted(scale * value.value)} {unit}".strip(), "95 % interval": ""}
     decimals = max(DIGITS - 1 - math.floor(math.log10(half)), 0)
@@ -79,16 +94,7 @@ def _row(value: Value) -> dict[str, str]:
     return {**name, "value": f"{middle} {unit}".strip(), "95 % interval": f"{low} to {high}"}
 
 
-def sentence(finding: Finding) -> str:
-    """What was found, as alternatives where that is all the recording shows, with what shows or separates them, and the remedy."""
-    parts = [f"{finding.what}{': either ' if finding.alternatives else ''}{', or '.join(finding.alternatives)}."]
-    if finding.separates:
-        parts.append(f"{'Separated' if finding.alternatives else 'Shown'} by: {finding.separates}.")
-    parts += [f"Remedy: {finding.cure}."] if finding.cure else []
-    return capitalized(" ".join(parts))
-
-
-def _brief(findings: list[Finding]) -> list[str]:
+def _brief(findings: Sequence[Finding]) -> list[str]:
     """The sentences of findings of one kind, of which there may be one for each toss."""
     more = len(findings) - MOST_ALIKE
     return [*map(sentence, findings[:MOST_ALIKE]), *([f"And {more} more of this kind ({findings[0].kind})."] if more > 0 else [])]

@@ -59,3 +59,11 @@ def test_interrupted_file_leaves_the_old_one(tmp_path):
         write()
     assert file.read_text() == "old"
     assert [one.name for one in tmp_path.iterdir()] == ["page.html"]
+
+
+def test_folder_of_a_study_replaces_that_of_an_earlier_one(tmp_path):
+    for name in ("early", "late"):
+        with study_folder(str(tmp_path)) as folder:
+            (folder / "scenes").mkdir()
+            (folder / "scenes" / f"{name}.toml").touch()
+    assert [path.name for path in (tmp_path / "scenes").iterdir()] == ["late.toml"]

@@ -328,7 +328,7 @@ def test_repeated_rows_missing_frames_uneven_times_and_another_rate_are_facts(tm
         ("gap", "1", 20, 2.0, 0.0),
         ("gap", "1", 28, 1.0, 0.0),
         ("jitter", "1", 36, 0.011, 0.01),
-        ("rate", "", 0, 100.0, 101.0),
+        ("rate", "", None, 100.0, 101.0),
     ]
 
 

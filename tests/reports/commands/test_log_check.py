@@ -11,9 +11,9 @@ import tomlkit
 from support.cli import TERMINAL, assert_refused, dropspin
 from support.tosses import BRICK, made
 
-from dropspin.comparisons.logs.recorded import Finding
+from dropspin.comparisons.logs.log import Finding, load_log
 from dropspin.comparisons.logs.replay import flights_in
-from dropspin.reports.stories.log_check import CheckedLog, sentence
+from dropspin.reports.stories.log_check import CheckedLog
 from dropspin.scenarios import load
 
 
@@ -53,7 +53,7 @@ def test_sound_recording_has_values_and_no_finding(recording):
 def test_finding_is_printed_with_alternatives_and_remedy_and_is_exit_code_1(recording):
     done = dropspin("log", "check", "short.toml", "-o", "out", cwd=recording)
     assert done.returncode == 1
-    said = r"Gravity is .* m/s²: either lengths are (.*)% short, or the rate is (.*)% low\. Separated by: .* Remedy: length_scale = "
+    said = r"Gravity is .* m/s² .*: either lengths are (.*) % short, or the rate is (.*) % low\. Separated by: .* Remedy: length_scale = "
     found = re.search(said, done.stdout)
     assert found is not None, done.stdout
     assert [float(number) for number in found.groups()] == pytest.approx([2.0, 1.0], abs=0.3)
@@ -71,6 +71,8 @@ def test_scene_of_each_toss_continues_it(tmp_path):
     np.testing.assert_allclose(scene.initial_state, start.state, rtol=0.0, atol=1e-15)
     assert scene.duration == pytest.approx(start.toss.t[-1] - start.toss.t[start.frame])
     assert scene.floor == flights.log.header.floor
+    header = load_log(tmp_path / "out" / "corrected.toml").header
+    assert (header.length_scale, header.body.center_of_mass) == (0.978, (-0.0002, 0.0009, 0.0061))
 
 
 def test_page_shows_what_is_printed_of_the_shipped_tosses(tmp_path):
@@ -82,23 +84,29 @@ def test_page_shows_what_is_printed_of_the_shipped_tosses(tmp_path):
 
 
 def test_many_findings_of_one_kind_are_shortened_on_a_terminal_alone():
-    findings = [Finding("gap", f"toss {number}: a frame is missing") for number in range(5)]
+    findings = [Finding("gap", 1.0, 0.0, str(number), 7) for number in range(5)]
     study = CheckedLog(recording="r", values=[], findings=findings, tosses=[])
     texts = [list(part.items) for part in study.document().parts if part.kind == "sentences"]
     assert [len(items) for items in texts] == [5, 4]
     assert texts[1][-1] == "And 2 more of this kind (gap)."
 
 
-def test_sentence_of_a_finding_with_one_cause_says_what_shows_it():
-    found = Finding("scale", "lengths are 2 % short", (), "length_scale = 0.98", "heights at rest are 0.98 of the expected ones")
-    expected = "Lengths are 2 % short. Shown by: heights at rest are 0.98 of the expected ones. Remedy: length_scale = 0.98."
-    assert sentence(found) == expected
+def test_help_of_log_lists_its_commands(tmp_path):
+    helped = dropspin("log", "--help", cwd=tmp_path)
+    assert helped.returncode == 0
+    assert re.findall(r"^  (\w+)  +(.*)\.$", helped.stdout, re.MULTILINE)[:3] == [
+        ("check", "Check a recording of tosses by their free flight"),
+        ("compare", "Compare engines with measured tosses"),
+        ("fit", "Find friction and restitution of measured tosses"),
+    ]
+    alone = dropspin("log", cwd=tmp_path)
+    assert (alone.returncode, alone.stderr) == (2, helped.stdout)
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("log",), "log needs a word more: log check"),
+        (("log", "chek"), "No such command 'chek'. Did you mean 'check'? To list what it takes: dropspin log --help"),
         (("log", "check", "toss-cub"), "recording 'toss-cub' is unknown. Did you mean 'toss-cube'?"),
         (("log", "check", "toss.npz"), "toss.npz: is the data of a recording; give its header"),
         (("log", "check", "absent.toml"), "absent.toml: No such file or directory"),

@@ -36,6 +36,7 @@ from dropspin.comparisons.engines.mujoco_model import (
     damped_axes,
     default_specification,
 )
+from dropspin.comparisons.engines.mujoco_settings import CONTACT, FLAGS, OPTION, SETTINGS
 from dropspin.comparisons.engines.mujoco_simulation import MuJoCoBatch, MuJoCoSimulation
 from dropspin.comparisons.engines.options import NumericOption
 from dropspin.comparisons.engines.packages import Version, formatted, numbers_of
@@ -77,7 +78,7 @@ CONTACTS_SINCE: Mapping[str, tuple[Version, str]] = {
 }
 """By shape, the first version whose calibrated contacts with a floor are right, and what is wrong in earlier ones."""
 
-SOLVER = {"cone": "elliptic", "jacobian": "dense", "diagexact": "enable", "island": "disable", "autoreset": "disable"}
+SOLVER = {name: str(setting.calibrated) for name, setting in (OPTION | FLAGS).items() if setting.calibrated} | {"autoreset": "disable"}
 """The solver settings of calibrated contacts, by their names in MJCF."""
 FLAGS_SINCE: Mapping[str, Version] = {"diagexact": EXACT_DIAGONAL, "island": (3, 3, 6)}  # earlier versions look for islands on request only
 FLIGHT_SINCE: Mapping[str, Mapping[Version, str]] = {
@@ -94,18 +95,7 @@ STRONGEST_FRICTION = 1e9
 """The largest coefficient that the adapter sets."""
 LEAST_OF_A_SPRING = 0.01  # restitution; the damping ratio there is 5, and a contact that is damped more hardly pushes
 FEWEST_SPRING_STEPS = 5  # with fewer steps the restitution is between 0.25 and 1.5 times the one asked for
-REASONS = {
-    "solref": "[0, -(1 + e)/dt]: a damper that turns v into -e v in one step; with the default spring the restitution is 0.13 for any e",
-    "solimp": "the hardest contact that MuJoCo allows, at any depth; at the default 0.9 to 0.95, restitution 0.5 becomes 0.466 at 0.25 ms, "
-    "and boxes rest 2 mm deep",
-    "solreffriction": "stops sliding in one step; if it follows solref, a gripping corner's slip is reversed, which costs 0.51 of its "
-    "angular momentum",
-    "condim": "1 without friction, 3 with",
-    "friction": "the scene's coefficient; 1e6 where the floor grips",
-    "cone": "elliptic: the same friction in every direction; with pyramidal cones a friction of 1e6 leaves no contact",
-    "jacobian": "MuJoCo's own choice for few bodies, set explicitly because version 4.0.0 has a fault in its sparse solver",
-    "diagexact": "the contact's exact inertia, not an estimate; at an impedance of 0.9999 the difference is 1e-4 of a corner's energy",
-    "island": "one body is one island; the search for it takes a seventh of a step",
+REASONS = {name: setting.why for name, setting in (CONTACT | OPTION | FLAGS).items() if setting.why} | {
     "autoreset": "a simulation that broke down stays broken; MuJoCo would put it back to its start without notice",
 }
 """Effects were measured on a ball dropped from 1 m and boxes on a corner and at rest, restitution 0.5, without the one setting."""
@@ -130,6 +120,7 @@ class MuJoCo(Engine):
         "beside": BESIDE,
     }
     representations: ClassVar = tuple(FORM)
+    settings: ClassVar = SETTINGS
     numbers: ClassVar = {"kappa": NumericOption(0.0, 0.0, 1.0), "spring_steps": NumericOption(0.0, 0.0, 1e4)}
 
     def __post_init__(self) -> None:
@@ -153,7 +144,7 @@ class MuJoCo(Engine):
     @property
     def _stops_in_a_step(self) -> bool:
         """Whether a contact is the damper over one step alone."""
-        return not {"profile", "kappa", "spring_steps"} & set(self.options)
+        return not {"profile", "kappa", "spring_steps", *self.given} & set(self.options)
 
     def discretisation(self, scene: Scenario) -> str | None:
         """The integrator's scheme, which depends on the gyroscopic term; contacts of the default profile have no name in common use."""
@@ -170,7 +161,7 @@ class MuJoCo(Engine):
 
     def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
         """The error of semi-implicit Euler about a fixed axis, and of a flat bounce detected late that loses (1 - d) g dt to impedance."""
-        if self.option("integrator") == "rk4" or self.is_default:
+        if self.option("integrator") == "rk4" or not self.is_calibrated:
             return None
         flight = flight_error(scene, truth, metric, dt, exact_rotation=True)
         if flight is not None or not self._stops_in_a_step:
@@ -204,7 +195,7 @@ class MuJoCo(Engine):
         since, wrong = CONTACTS_SINCE.get(scene.body.shape, (OLDEST, ""))
         if since > VERSION:
             return f"MuJoCo {formatted(VERSION)} is installed, {wrong}"
-        if self.option("integrator") == "rk4" and "spring_steps" not in self.options:
+        if self.option("integrator") == "rk4" and not {"spring_steps", "solref"} & set(self.options):
             return (
                 "with RK4 the adapter's one-step damper acts in all stages, and no body rebounds; use integrator=euler, or spring_steps=20"
             )
@@ -222,7 +213,7 @@ class MuJoCo(Engine):
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
         """The settings as Python and as MJCF."""
-        if self.is_default or not can_be_pasted(scene):
+        if not self.is_calibrated or not can_be_pasted(scene):
             return {}
         settings = {"integrator": self.option("integrator"), "solver": self._flags(), "pair": self._pairs(scene, dt)[0]}
         values = {"engine": "MuJoCo", "dt": dt} | settings
@@ -235,11 +226,10 @@ class MuJoCo(Engine):
         integrator, form = self.option("integrator"), {name: self.option(name) for name in FORM}
         settings = {"profile": self.option("profile"), "integrator": integrator} | form
         if self.is_default:
-            return MuJoCoSimulation(scene, default_specification(scene, dt, integrator, form), settings)
-        pairs = self._pairs(scene, dt)
-        flags = self._flags() if pairs else {"autoreset": "disable"}
-        settings |= flags | (pairs[0] if pairs else {}) | ({"walls": pairs[1:]} if scene.wall else {})
-        return MuJoCoSimulation(scene, calibrated_specification(scene, dt, integrator, form, pairs, flags), settings)
+            specification = default_specification(scene, dt, integrator, form)
+        else:
+            specification = calibrated_specification(scene, dt, integrator, form, self._pairs(scene, dt), self._flags())
+        return MuJoCoSimulation(scene, specification, settings, self.given)
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
         if VERSION < BATCHES:

@@ -13,6 +13,7 @@ from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, D
 from dropspin.comparisons.engines.mapping import built, principal_frame
 from dropspin.comparisons.engines.mujoco_limitations import limitations_met
 from dropspin.comparisons.engines.mujoco_model import damped_axes
+from dropspin.comparisons.engines.mujoco_settings import in_force, set_in
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.model import initial_states
@@ -34,11 +35,15 @@ class MuJoCoSimulation(Simulation):
         axes: The axes of the free body in the frame of the scene's body, a quaternion; None where they are the same (`damped_axes`).
     """
 
-    def __init__(self, scene: Scenario, specification: Any, settings: Mapping[str, Any]) -> None:
+    def __init__(self, scene: Scenario, specification: Any, settings: Mapping[str, Any], given: Mapping[str, Any]) -> None:
+        """Compile a specification, and set the settings that were given in the model."""
         self._scene, self.model, self.axes = scene, specification.compile(), damped_axes(scene)
         self.velocity_lag = 0.0 if settings["integrator"] == "rk4" else 0.5 * self.model.opt.timestep
-        self.settings = {"version": mujoco.__version__, **settings}
         set_damping(self.model, scene)
+        set_in(self.model, given)
+        of_model = in_force(self.model, len(scene.surfaces) - 1)
+        self.settings = {"version": mujoco.__version__, **settings, "autoreset": "disable", **of_model}
+        self._is_calibrated = settings["profile"] == "calibrated" and not given
         self._data = mujoco.MjData(self.model)
         start = _starts(self.model, [scene])[0]
         self._data.qpos[:], self._data.qvel[:] = np.split(start, [self.model.nq])
@@ -64,8 +69,7 @@ class MuJoCoSimulation(Simulation):
 
     def limitations_of(self, scene: Scenario, states: Array) -> list[KnownLimitation]:
         """The limitations that a motion met, given its states after each step, shape (n, 13)."""
-        is_calibrated = self.settings["profile"] == "calibrated"
-        return list(limitations_met(scene, states, self.model.opt.timestep)) if is_calibrated else []
+        return list(limitations_met(scene, states, self.model.opt.timestep)) if self._is_calibrated else []
 
     def _each_step(self, steps: int) -> Array:
         """Record with MuJoCo's rollout, which takes a fifth to a quarter less time than a Python loop and gives the same bits."""

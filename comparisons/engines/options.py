@@ -1,11 +1,13 @@
 """An engine's name, its options with their values, and the label that they make, such as `mujoco[integrator=rk4]`."""
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 from dropspin.comparisons.measuring.symmetries import REPRESENTED
 from dropspin.scenarios.errors import DropspinError, UnknownName
+from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import shown
 
 FEWEST_VALUES = 3
@@ -26,6 +28,75 @@ class NumericOption(NamedTuple):
     most: float
 
 
+Value = int | float | str | tuple[float, ...]
+"""The value of a setting."""
+SWITCH = {"false": 0, "no": 0, "off": 0, "disable": 0, "0": 0, "true": 1, "yes": 1, "on": 1, "enable": 1, "1": 1}
+"""What may be written for off and for on, in small letters."""
+ELSEWHERE = {
+    "the time step of the run; give it with --dt": ("dt", "timestep", "fixedTimeStep"),
+    "the scene's: change the table gravity": ("gravity",),
+    "the scene's: change the table body": ("mass", "inertia", "localInertiaDiagonal"),
+    "the scene's: change the table damping": ("damping", "dof_damping"),
+}
+"""What is no option of an engine because it is given elsewhere."""
+
+
+class Setting(NamedTuple):
+    """A documented setting of an engine's library, which the option of its name sets.
+
+    Attributes:
+        default: The library's own value: a number (a whole one is an `int`), numbers, or one of `values`.
+        what: What it is.
+        calibrated: Its value in the calibrated profile; None if that is the library's own, or computed.
+        why: The reason for the value in the calibrated profile.
+        unit: Its unit.
+        least: The least value allowed.
+        most: The largest value allowed.
+        values: The words allowed; of two, the first means off.
+        is_computed: Whether the calibrated profile computes it from the scene and the time step.
+        needs: The options without which it has no effect, each with the value that it needs.
+    """
+
+    default: Value
+    what: Text
+    calibrated: Value | None = None
+    why: Text = ""
+    unit: Text = "1"
+    least: float = 0.0
+    most: float = math.inf
+    values: tuple[Text, ...] = ()
+    is_computed: bool = False
+    needs: tuple[tuple[Text, Text], ...] = ()
+
+    @property
+    def allowed(self) -> str:
+        """Its allowed values in words."""
+        if self.values:
+            return f"one of {', '.join(self.values)}"
+        size = len(self.default) if isinstance(self.default, tuple) else 1
+        number = f"{size} numbers" if size > 1 else f"a {'whole ' * isinstance(self.default, int)}number"
+        from_to = "" if self.least == -math.inf else f" from {self.least:g}" + f" to {self.most:g}" * (self.most < math.inf)
+        return number + from_to
+
+    def parsed(self, text: str) -> Value | None:
+        """A value that is written as text, such as `0.02 1`; None if it is not allowed."""
+        switch = SWITCH.get(text.lower())
+        if self.values:
+            word = self.values[switch] if switch is not None and len(self.values) == 2 else text
+            return word if word in self.values else None
+        try:
+            numbers = [float(part) for part in (text if switch is None else str(switch)).split()]
+        except ValueError:
+            return None
+        if not all(self.least <= number <= self.most and math.isfinite(number) for number in numbers):
+            return None
+        if isinstance(self.default, tuple):
+            return tuple(numbers) if len(numbers) == len(self.default) else None
+        if len(numbers) != 1 or (isinstance(self.default, int) and not numbers[0].is_integer()):
+            return None
+        return int(numbers[0]) if isinstance(self.default, int) else numbers[0]
+
+
 @dataclass(frozen=True)
 class Configured:
     """What has a name and options.
@@ -41,6 +112,8 @@ class Configured:
     """Each option's values, the default first."""
     numbers: ClassVar[Mapping[str, NumericOption]] = {}
     """Each numeric option's default and range."""
+    settings: ClassVar[Mapping[str, Setting]] = {}
+    """The settings of the engine's library that can be given as options, by their documented names."""
     accuracy: ClassVar[Mapping[str, tuple[float | str, ...]]] = {}
     """Options besides the time step that set the accuracy, each with three values or more, coarsest first: {"rtol": (1e-4, 1e-6, 1e-8)}.
 
@@ -54,12 +127,24 @@ class Configured:
     """
 
     def __post_init__(self) -> None:
-        chosen = {option: self._canonical(option, value) for option, value in sorted(self.options.items())}
-        object.__setattr__(self, "options", {option: value for option, value in chosen.items() if value != self._default(option)})
+        names = {_bare(name): name for name in self._known}
+        chosen = [(names.get(_bare(option), option), value) for option, value in self.options.items()]
+        options = {option: self._canonical(option, value) for option, value in sorted(chosen)}
+        if len(options) < len(chosen):
+            raise DropspinError(f"{self.name}: an option is given twice; give each of {', '.join(options)} once.")
+        object.__setattr__(
+            self, "options", {name: text for name, text in options.items() if name in self.settings or text != self._default(name)}
+        )
+        for setting in self.given:
+            for option, value in self.settings[setting].needs:
+                if self.option(option) != value:
+                    raise DropspinError(
+                        f"engine {self.label!r}: {setting} has no effect with {option}={self.option(option)}; it needs {option}={value}."
+                    )
         for option in self.representations:
             self._verify_known("representation", option, self.choices)
         for option, values in self.accuracy.items():
-            self._verify_known("accuracy option", option, [*self.choices, *self.numbers])
+            self._verify_known("accuracy option", option, self._known)
             if len(set(values)) < FEWEST_VALUES:
                 raise DropspinError(
                     f"{self.name}.accuracy[{option!r}]: got {shown(values)}; give at least {FEWEST_VALUES} values, coarsest first."
@@ -67,7 +152,18 @@ class Configured:
 
     def _canonical(self, option: str, value: str) -> str:
         """An option's value in its canonical spelling, so that equal options have equal labels."""
-        self._verify_known("option", option, [*self.choices, *self.numbers])
+        for why, names in ELSEWHERE.items():
+            if option not in self._known and _bare(option) in map(_bare, names):
+                raise DropspinError(f"{self.name}'s {option} is {why}.")
+        self._verify_known("option", option, self._known)
+        if option in self.settings:
+            setting = self.settings[option]
+            parsed = setting.parsed(value)
+            if parsed is None:
+                raise DropspinError(
+                    f"{self.name}'s {option}: got {value!r}; it is {setting.allowed}, by default {spelled(setting.default)}."
+                )
+            return spelled(parsed)
         if option not in self.numbers:
             self._verify_known(option, value, self.choices[option])
             return value
@@ -78,23 +174,44 @@ class Configured:
             number = float("nan")
         if not allowed.least <= number <= allowed.most:
             raise DropspinError(f"{self.name}'s {option}: got {value!r}; it is a number from {allowed.least:g} to {allowed.most:g}.")
-        return _spelled(number)
+        return spelled(number)
 
     def _verify_known(self, kind: str, given: str, known: Collection[str]) -> None:
         if given not in known:
             raise UnknownName(f"{self.name}'s {kind}", given, known)
 
+    @property
+    def _known(self) -> list[str]:
+        return [*self.choices, *self.numbers, *self.settings]
+
     def _default(self, option: str) -> str:
-        return _spelled(self.numbers[option].default) if option in self.numbers else self.choices[option][0]
+        if option in self.settings:
+            return spelled(self.profile_value(option))
+        return spelled(self.numbers[option].default) if option in self.numbers else self.choices[option][0]
 
     def option(self, name: str) -> str:
         """An option's value, given or default."""
         return self.options.get(name, self._default(name))
 
     @property
+    def given(self) -> dict[str, Any]:
+        """The values of the settings that were given."""
+        return {name: self.settings[name].parsed(text) for name, text in self.options.items() if name in self.settings}
+
+    def profile_value(self, setting: str) -> Value:
+        """The value of a setting in the engine's profile where it is not computed."""
+        found = self.settings[setting]
+        return found.default if self.is_default or found.calibrated is None else found.calibrated
+
+    @property
     def is_default(self) -> bool:
         """Whether the engine keeps its own defaults (profile=default)."""
         return self.options.get("profile") == "default"
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether all settings are those of the calibrated profile."""
+        return not self.is_default and not self.given
 
     @property
     def label(self) -> str:
@@ -109,7 +226,7 @@ class Configured:
         """The engine with each set of values of its accuracy options, coarsest first; empty if it has none."""
         count = min(map(len, self.accuracy.values()), default=0)
         finest = {option: values[-count:] for option, values in self.accuracy.items()}
-        return [self._with({option: _spelled(values[level]) for option, values in finest.items()}) for level in range(count)]
+        return [self._with({option: spelled(values[level]) for option, values in finest.items()}) for level in range(count)]
 
     def refined(self, dts: Sequence[float]) -> list[tuple[float, Self]]:
         """The finest of some time steps [s], coarsest first, and the engine at each, its accuracy options refined with the step."""
@@ -127,10 +244,17 @@ class Configured:
         }
 
 
-def _spelled(value: float | str) -> str:
-    """An option's value as text: a number with six digits if these are exact, else with all."""
+def _bare(name: str) -> str:
+    """The name of an option without underscores, in small letters: `linear_damping` is `linearDamping`."""
+    return name.replace("_", "").lower()
+
+
+def spelled(value: Value | Sequence[float]) -> str:
+    """An option's value as text: a number with six digits if these are exact, else with all; several with spaces between them."""
     if isinstance(value, str):
         return value
+    if isinstance(value, Sequence):
+        return " ".join(map(spelled, value))
     return f"{value:g}" if float(f"{value:g}") == value else repr(float(value))
 
 

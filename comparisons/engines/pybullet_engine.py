@@ -5,7 +5,7 @@ the error reduction that adds penetration to the rebound, and the speed below wh
 """
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,59 +24,27 @@ from dropspin.comparisons.engines.mapping import (
     refusal_of_hull,
     refusal_of_neighbour,
 )
+from dropspin.comparisons.engines.options import Setting
 from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.engines.pybullet_limitations import LARGEST_TURN, MOST_BALLS, STRONGEST_FRICTION
+from dropspin.comparisons.engines.pybullet_settings import BODY, FASTEST, FLOOR, NEVER_SLEEPS, SETTINGS, WORLD
 from dropspin.comparisons.engines.pybullet_simulation import PyBulletSimulation
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
 from dropspin.scenarios.bodies import SHAPES, Box, OnAxis, Vertices
+from dropspin.scenarios.surfaces import Surface
 
 SMALLEST_INERTIA = 2.3e-16  # (kg m²)³; Bullet's solver of three equations takes a smaller determinant for 0
 FASTEST_DECAY = 30.0  # 1/s; from 37 on 1 - exp(-rate) is 1 in double precision, and the body stops
-FASTEST = 1e12  # m/s and rad/s; Bullet clamps the speeds of a multibody to 100 by default
 RESIDUAL = float(np.finfo(float).eps)  # of the speed that gravity gives in a step; Bullet's residuals are squares of speeds
-NEVER_SLEEPS = 2  # pybullet.ACTIVATION_STATE_DISABLE_SLEEPING
-WORLD: Mapping[str, tuple[float, str]] = {
-    "fixedTimeStep": (np.nan, "the step asked for; Bullet's own is 1/240 s"),
-    "numSubSteps": (0, "no steps within a step, whose states would not be recorded"),
-    "solverResidualThreshold": (
-        np.nan,
-        "the square of one ulp of the speed that gravity gives in a step: solved to rounding, for two thirds of the cost of 0; at the "
-        "default 1e-7 a resting box jitters at 5 mm/s, a corner errs by 5e-6",
-    ),
-    "numSolverIterations": (
-        500,
-        "enough to solve contacts to rounding; the default, 50, leaves an error at impacts on a floor that grips",
-    ),
-    "erp": (0.0, "as contactERP, for joints"),
-    "contactERP": (
-        0.0,
-        "corrects no depth; at the default 0.08 a resting box jitters at 3 mm/s, and rebounds gain the depth over a step",
-    ),
-    "frictionERP": (0.0, "as contactERP, for friction"),
-    "contactSlop": (0.0, "tolerates no depth"),
-    "restitutionVelocityThreshold": (np.nan, "the scene's rest speed, by default 0; Bullet drops restitution below 0.2 m/s"),
-    "useSplitImpulse": (1, "keeps corrections of depth out of the velocities"),
-    "splitImpulsePenetrationThreshold": (0.0, "at any depth"),
-    "enableConeFriction": (
-        1,
-        "the same friction in every direction, for a multibody; maximal coordinates ignore it, and limit friction along the initial slip "
-        "and across it separately, so that friction is up to 1.41 times larger where the slip turns in an impact",
-    ),
-    "deterministicOverlappingPairs": (1, "contacts in the same order in every run"),
-}
-"""The calibrated parameters of the physics engine, NaN for those that depend on the scene or the step; and why."""
-REASONS = {name: why for name, (_, why) in WORLD.items()} | {
+REASONS = {name: setting.why for name, setting in SETTINGS.items() if setting.why} | {
+    "fixedTimeStep": "the step asked for; Bullet's own is 1/240 s",
     "coordinates": "maximal: a rebound of e times the approach speed; a multibody's is e (u + g dt), and its speeds are clamped at 100",
-    "restitution": "the scene's; Bullet multiplies those of two bodies, and the floor's is 1",
-    "lateralFriction": f"the scene's coefficient; {STRONGEST_FRICTION:g}, the most that Bullet allows, where the floor grips",
-    "contactProcessingThreshold": "contacts begin at touch; at the default, restitution 0.5 becomes 0.248 at 1 ms and 0.024 at 0.25 ms",
-    "linearDamping": "1 - exp(-rate), 0 without damping; a multibody's default is 0.04",
-    "angularDamping": "as linearDamping",
-    "activationState": "never falls asleep",
-    "maxJointVelocity": "no clamp of a multibody's speeds, which are by default 100 m/s and 100 rad/s (velocity_clamp=kept keeps them)",
 }
 """Effects were measured on a ball dropped from 1 m and a box at rest, restitution 0.5, without the one setting."""
+
+
+COEFFICIENTS = ("restitution", "lateralFriction")
 
 
 class PyBullet(Engine):
@@ -92,18 +60,25 @@ class PyBullet(Engine):
         "beside": BESIDE,
     }
     representations: ClassVar = ("body", "floor", "beside")
+    settings: ClassVar = SETTINGS
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.is_default and {"coordinates", "velocity_clamp"} & self.options.keys():
             raise DropspinError(f"engine {self.label!r}: profile=default sets coordinates and velocity_clamp; leave these out.")
+        if len({"contactStiffness", "contactDamping"} & self.given.keys()) == 1:
+            raise DropspinError(f"engine {self.label!r}: contactStiffness and contactDamping go together; give both, or neither.")
         if self.option("velocity_clamp") == "kept" and not self.is_multibody:
             raise DropspinError(f"engine {self.label!r}: only multibodies clamp speeds; add coordinates=multibody.")
+
+    def option(self, name: str) -> str:
+        """An option's value; the default profile sets the coordinates."""
+        return "multibody" if name == "coordinates" and self.is_default else super().option(name)
 
     @property
     def is_multibody(self) -> bool:
         """Whether the body is Bullet's btMultiBody, its default, rather than a btRigidBody."""
-        return self.is_default or self.option("coordinates") == "multibody"
+        return self.option("coordinates") == "multibody"
 
     def discretisation(self, scene: Scenario) -> str | None:
         """Maximal coordinates solve the gyroscopic term implicitly, with one Newton step; multibodies do not, and have other contacts."""
@@ -111,11 +86,11 @@ class PyBullet(Engine):
         flight = gyroscopic if may_tumble(scene) else SEMI_IMPLICIT_EULER
         if scene.floor is None:
             return flight
-        return None if self.is_multibody else f"{flight}, {LATE_IMPACTS}"
+        return None if self.is_multibody or self.given else f"{flight}, {LATE_IMPACTS}"
 
     def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
         """The error of semi-implicit Euler about a fixed axis, and of a flat bounce: detected late, or in a multibody after gravity."""
-        if self.is_default or np.linalg.norm(scene.start.angular_velocity) * dt > LARGEST_TURN:
+        if not self.is_calibrated or np.linalg.norm(scene.start.angular_velocity) * dt > LARGEST_TURN:
             return None
         flight = flight_error(scene, truth, metric, dt, exact_rotation=True)
         return bounce_error(scene, truth, metric, dt, gravity_first=self.is_multibody) if flight is None else flight
@@ -150,35 +125,50 @@ class PyBullet(Engine):
             return "box" if isinstance(scene.body, Box | OnAxis) and not self.is_default else "plane"
         return self.option("floor")
 
-    def _parameters(self, scene: Scenario, dt: float) -> dict[str, float]:
+    def _given(self, kind: Mapping[str, Setting]) -> dict[str, Any]:
+        """The settings of a kind that were given."""
+        return {name: value for name, value in self.given.items() if name in kind}
+
+    def _parameters(self, scene: Scenario, dt: float) -> dict[str, Any]:
         """The parameters of the physics engine at a time step [s]."""
         if self.is_default:
-            return {"fixedTimeStep": dt}
-        return {name: value for name, (value, _) in WORLD.items()} | {
+            return {"fixedTimeStep": dt} | self._given(WORLD)
+        computed = {
             "fixedTimeStep": dt,
             "solverResidualThreshold": (RESIDUAL * float(np.linalg.norm(scene.acceleration)) * dt) ** 2,
             "restitutionVelocityThreshold": 0.0 if scene.floor is None else scene.floor.rest_speed,
         }
+        return {name: one.calibrated for name, one in WORLD.items() if one.calibrated is not None} | computed | self._given(WORLD)
 
-    def _dynamics(self, scene: Scenario) -> dict[str, float]:
+    def _dynamics(self, scene: Scenario) -> dict[str, Any]:
         """The properties of the body: contact, damping, sleep and clamp.
 
-        Maximal coordinates damp as v (1 - k)^t, so that k = 1 - exp(-rate) is the scene's decay. In the default profile a scene without
-        damping keeps Bullet's default of 0.04.
+        Bullet multiplies the coefficients of the two bodies; with 1 for one of them, the product is the scene's value: for the floor, or
+        for the body if there are walls. Maximal coordinates damp as v (1 - k)^t, so that k = 1 - exp(-rate) is the scene's decay. In the
+        default profile a scene without damping keeps Bullet's default of 0.04.
         """
         floor, damping = scene.floor, scene.damping
         rates = {f"{motion}Damping": rate for motion, rate in damping.rates.items()} if damping else {}
-        found = {"restitution": floor.restitution, "lateralFriction": friction_of(floor, STRONGEST_FRICTION)} if floor else {}
+        found: dict[str, Any] = {}
+        if floor is not None:
+            found = dict.fromkeys(COEFFICIENTS, 1.0) if scene.wall else _coefficients(floor)
         if self.is_default:
-            return found | rates
+            return found | rates | self._given(BODY)
         found |= {"contactProcessingThreshold": 0.0} if floor else {}
         found |= {name: float(-np.expm1(-rates.get(name, 0.0))) for name in ("linearDamping", "angularDamping")}
         found["activationState"] = NEVER_SLEEPS
-        return found | ({"maxJointVelocity": FASTEST} if self.is_multibody and self.option("velocity_clamp") == "lifted" else {})
+        found |= {"maxJointVelocity": FASTEST} if self.is_multibody and self.option("velocity_clamp") == "lifted" else {}
+        return found | self._given(BODY)
+
+    def _surfaces(self, scene: Scenario) -> list[dict[str, Any]]:
+        """The properties of the floor and each wall."""
+        given = {name.removeprefix("floor_"): value for name, value in self._given(FLOOR).items()}
+        begins = {} if self.is_default else {"contactProcessingThreshold": 0.0}
+        return [(_coefficients(one) if scene.wall else dict.fromkeys(COEFFICIENTS, 1.0)) | begins | given for one in scene.surfaces]
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
         """The settings as Python, and the body's part of them as URDF."""
-        if self.is_default or not can_be_pasted(scene):
+        if not self.is_calibrated or not can_be_pasted(scene):
             return {}
         moments = np.diag(scene.body.inertia_tensor)[[2, 0, 1]].tolist()
         sizes = [2.0 * scene.body.half_extents[axis] for axis in (2, 0, 1)] if isinstance(scene.body, Box) else []
@@ -193,4 +183,10 @@ class PyBullet(Engine):
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         coordinates = "multibody" if self.is_multibody else "maximal"
         form = {"profile": self.option("profile"), "coordinates": coordinates} | {name: self.option(name) for name in self.representations}
-        return PyBulletSimulation(scene, dt, form, self._floor_in(scene), self._parameters(scene, dt), self._dynamics(scene))
+        form |= {"floor": self._floor_in(scene)} if scene.floor else {}
+        return PyBulletSimulation(scene, dt, form, self._parameters(scene, dt), self._dynamics(scene), self._surfaces(scene))
+
+
+def _coefficients(surface: Surface) -> dict[str, float]:
+    """Restitution and friction of a floor or a wall."""
+    return dict(zip(COEFFICIENTS, (surface.restitution, friction_of(surface, STRONGEST_FRICTION)), strict=True))

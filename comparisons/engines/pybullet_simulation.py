@@ -20,11 +20,11 @@ from dropspin.comparisons.engines.mapping import (
     bodies_in,
     box_of,
     built,
-    friction_of,
     principal_frame,
 )
 from dropspin.comparisons.engines.packages import version
-from dropspin.comparisons.engines.pybullet_limitations import STRONGEST_FRICTION, is_hull, limitations_met
+from dropspin.comparisons.engines.pybullet_limitations import is_hull, limitations_met
+from dropspin.comparisons.engines.pybullet_settings import SETTINGS, read_back
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Body, Box, Capsule, Ellipsoid, OnAxis, Sphere
 from dropspin.scenarios.bodies.inertia import is_diagonal
@@ -33,8 +33,6 @@ from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, UP
 from dropspin.scenarios.surfaces import Floor, Surface, Wall
 
 BALL = 1e-9  # of the body's size; the radius of the balls that are its vertices, which must not be 0
-CONTACT = ("restitution", "lateralFriction", "contactProcessingThreshold")
-"""The properties of a body that are of its contacts."""
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 Z_TO_Y = np.array([-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)])
 """The rotation that takes the z axis, along which Bullet has capsules and cylinders, to the y axis."""
@@ -47,36 +45,43 @@ class PyBulletSimulation(Simulation):
     """A connection to the physics server in this process, which no other simulation uses until it is closed."""
 
     def __init__(
-        self, scene: Scenario, dt: float, form: Mapping[str, str], floor: str, parameters: dict[str, float], dynamics: dict[str, float]
+        self,
+        scene: Scenario,
+        dt: float,
+        form: Mapping[str, str],
+        parameters: Mapping[str, Any],
+        dynamics: Mapping[str, Any],
+        surfaces: Sequence[Mapping[str, Any]],
     ) -> None:
         """Build a scene.
 
         Args:
             scene: The scene.
             dt: Time step [s].
-            form: The profile (`calibrated` or `default`), the coordinates (`maximal` or `multibody`), and how body and floor are built.
-            floor: `plane`, `box`, or `mesh` (two triangles); walls are then boxes if the floor is one, else planes.
+            form: The profile (`calibrated` or `default`), the coordinates (`maximal` or `multibody`), and how body and floor are built; the
+                floor is a `plane`, a `box`, or a `mesh` (two triangles), and walls are boxes if the floor is one, else planes.
             parameters: Of the physics engine.
             dynamics: Properties of the body.
+            surfaces: Properties of the floor and the walls.
         """
-        self._scene, self._dt, self.velocity_lag = scene, dt, 0.5 * dt
-        self._is_maximal, self._idle = form["coordinates"] == "maximal", _idle.setdefault(form["profile"], [])
+        self._scene, self._dt, self.velocity_lag = scene, dt, 0.5 * dt / max(1, parameters.get("numSubSteps", 0))
+        self._is_maximal, self._idle = form["coordinates"] == "maximal", _idle.setdefault(frozenset(parameters), [])
         self._bullet, self._uses = self._idle.pop() if self._idle else (Connection(), 0)
         tensor = scene.body.inertia_tensor
         self._to_body = None if is_diagonal(tensor) else conjugate(principal_frame(tensor)[1])
-        self.settings = {"version": version("pybullet"), **form, **parameters, **dynamics}
         try:
             self._bullet.setPhysicsEngineParameter(**parameters)
             self._bullet.setGravity(*map(float, scene.acceleration))
-            # Bullet multiplies the coefficients of the two bodies; with 1 for one of them, the product is the scene's value.
-            if scene.wall is not None:
-                dynamics = dynamics | {"restitution": 1.0, "lateralFriction": 1.0}
-            for surface in scene.surfaces:
-                own = {"restitution": surface.restitution, "lateralFriction": friction_of(surface, STRONGEST_FRICTION)}
-                contact = {name: dynamics[name] for name in CONTACT if name in dynamics}
-                contact |= own if scene.wall is not None else {"restitution": 1.0, "lateralFriction": 1.0}
-                self._bullet.changeDynamics(self._add_plane(surface, floor), -1, **contact)
+            planes = []
+            for surface, properties in zip(scene.surfaces, surfaces, strict=True):
+                planes.append(self._add_plane(surface, form["floor"]))
+                self._bullet.changeDynamics(planes[-1], -1, **properties)
             self._body, *_ = [self._add_body(one, form["body"], dynamics) for one in bodies_in(scene, form["beside"])]
+            of_floor = {f"floor_{name}": value for name, value in surfaces[0].items()} if surfaces else {}
+            passed = {**parameters, **dynamics, **of_floor, **({"walls": surfaces[1:]} if scene.wall else {})}
+            read = read_back(self._bullet, self._body, planes[0] if planes else None, self._is_maximal)
+            differing = {name: value for name, value in read.items() if name in passed or value != SETTINGS[name].default}
+            self.settings = {"version": version("pybullet"), **form, **passed, **differing}
         except BaseException:
             self._reset()
             raise
@@ -202,8 +207,11 @@ class Connection:
         return partial(found, physicsClientId=self.client) if callable(found) else found
 
 
-_idle: dict[str, list[tuple[Connection, int]]] = {}
-"""Unused connections, by profile, and how often each was used since it was reset; they give the bits that new ones give."""
+_idle: dict[frozenset[str], list[tuple[Connection, int]]] = {}
+"""Unused connections, by the names of the parameters set in them, and how often each was used since it was reset.
+
+They give the bits that new ones give.
+"""
 
 
 @cache

@@ -10,13 +10,13 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from dropspin.comparisons.engines.adapter_code import adapter_code
 from dropspin.comparisons.engines.base import Engine, EngineBroken
-from dropspin.comparisons.engines.options import NumericOption
+from dropspin.comparisons.engines.options import NumericOption, Setting
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import validated
 
 LONGEST_SUMMARY = 500
-STATED = ("name", "choices", "numbers", "accuracy", "compiles")
+STATED = ("name", "choices", "numbers", "settings", "accuracy", "compiles")
 """Attributes of a class that a stand-in has too."""
 Short = Annotated[Text, Field(max_length=100)]
 
@@ -30,6 +30,7 @@ class Traits(BaseModel):
         summary: The first line of its docstring.
         choices: Each option's values, the default first.
         numbers: Each numeric option's default and range.
+        settings: The settings of its library that can be given.
         accuracy: The values of options that set the accuracy.
         options: The options that were given and differ from the defaults.
         compiles: Whether it compiles when a scene is first simulated.
@@ -43,6 +44,7 @@ class Traits(BaseModel):
     summary: Annotated[Text, Field(max_length=LONGEST_SUMMARY)]
     choices: dict[Short, tuple[Short, ...]]
     numbers: dict[Short, NumericOption]
+    settings: dict[Short, Setting]
     accuracy: dict[Short, tuple[Short | float, ...]]
     options: dict[Short, Short]
     compiles: bool

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from dropspin.comparisons.engines.base import OneWorld as OneWorld
     from dropspin.comparisons.engines.base import Simulation as Simulation
     from dropspin.comparisons.engines.options import NumericOption as NumericOption
+    from dropspin.comparisons.engines.options import Setting as Setting
     from dropspin.comparisons.engines.program_engine import ProgramEngine as ProgramEngine
     from dropspin.comparisons.engines.registry import engine as engine
     from dropspin.comparisons.engines.registry import engine_names as engine_names

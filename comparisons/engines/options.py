@@ -136,11 +136,10 @@ class Configured:
             self, "options", {name: text for name, text in options.items() if name in self.settings or text != self._default(name)}
         )
         for setting in self.given:
-            for option, value in self.settings[setting].needs:
-                if self.option(option) != value:
-                    raise DropspinError(
-                        f"engine {self.label!r}: {setting} has no effect with {option}={self.option(option)}; it needs {option}={value}."
-                    )
+            if (unmet := self.unmet_need(setting)) is not None:
+                option, value = unmet
+                actual = f"{option}={self.option(option)}"
+                raise DropspinError(f"engine {self.label!r}: {setting} has no effect with {actual}; it needs {option}={value}.")
         for option in self.representations:
             self._verify_known("representation", option, self.choices)
         for option, values in self.accuracy.items():
@@ -203,6 +202,10 @@ class Configured:
         found = self.settings[setting]
         return found.default if self.is_default or found.calibrated is None else found.calibrated
 
+    def unmet_need(self, setting: str) -> tuple[str, str] | None:
+        """An option with the value without which a setting has no effect; None if it has one."""
+        return next((need for need in self.settings[setting].needs if self.option(need[0]) != need[1]), None)
+
     @property
     def is_default(self) -> bool:
         """Whether the engine keeps its own defaults (profile=default)."""
@@ -212,6 +215,11 @@ class Configured:
     def is_calibrated(self) -> bool:
         """Whether all settings are those of the calibrated profile."""
         return not self.is_default and not self.given
+
+    @property
+    def calibrated(self) -> Self:
+        """The engine with calibrated settings and its other options."""
+        return replace(self, options={name: text for name, text in self.options.items() if name not in ("profile", *self.settings)})
 
     @property
     def label(self) -> str:

@@ -66,8 +66,11 @@ class PyBullet(Engine):
         super().__post_init__()
         if self.is_default and {"coordinates", "velocity_clamp"} & self.options.keys():
             raise DropspinError(f"engine {self.label!r}: profile=default sets coordinates and velocity_clamp; leave these out.")
-        if len({"contactStiffness", "contactDamping"} & self.given.keys()) == 1:
-            raise DropspinError(f"engine {self.label!r}: contactStiffness and contactDamping go together; give both, or neither.")
+        for of in ("", "floor_"):
+            if len({f"{of}contactStiffness", f"{of}contactDamping"} & self.given.keys()) == 1:
+                raise DropspinError(
+                    f"engine {self.label!r}: {of}contactStiffness and {of}contactDamping go together; give both, or neither."
+                )
         if self.option("velocity_clamp") == "kept" and not self.is_multibody:
             raise DropspinError(f"engine {self.label!r}: only multibodies clamp speeds; add coordinates=multibody.")
 

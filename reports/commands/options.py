@@ -14,7 +14,12 @@ if TYPE_CHECKING:
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 engines_option = click.option(
-    "-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, with options; repeat for more."
+    "-e",
+    "--engine",
+    "engines",
+    multiple=True,
+    metavar="ENGINE",
+    help="An engine, with options (dropspin show ENGINE lists them); repeat for more.",
 )
 as_json = click.option("--json", "json_output", is_flag=True, help="Print JSON instead of a table.")
 BASELINE = "dropspin-baseline.toml"

@@ -24,7 +24,12 @@ CORE_ENGINES = ("wang", "mujoco", "pybullet")
 @click.command("run")
 @click.argument("scenes", nargs=-1, metavar="[SCENE]...")
 @click.option(
-    "-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, such as mujoco[integrator=rk4]; repeat for more."
+    "-e",
+    "--engine",
+    "engines",
+    multiple=True,
+    metavar="ENGINE",
+    help="An engine, such as mujoco[integrator=rk4] (dropspin show ENGINE lists options); repeat for more.",
 )
 @click.option(
     "--dt", "dts", multiple=True, type=float, metavar="SECONDS", help="A time step; repeat for more. [default: 0.004, 0.002, 0.001]"

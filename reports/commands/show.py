@@ -13,8 +13,10 @@ from dropspin.reports.commands.options import as_json, step_option
 def show_command(scene: str, engine_name: str | None, dt: float, json_output: bool) -> None:
     """Show a scene: what it models, its exact solution and its expectations; or the settings of an engine for the scene.
 
-    Of a mesh (.obj, .stl): its volume, mass properties, hull and defects.
+    Of an engine: its options, and the settings of its library that can be given as options. Of a mesh (.obj, .stl): its volume, mass
+    properties, hull and defects.
     """
+    from dropspin.comparisons.engines.registry import engine_names, parsed
     from dropspin.reports.document import Document, Table
     from dropspin.reports.stories import show
     from dropspin.reports.stories.mesh import mesh_rows
@@ -23,7 +25,9 @@ def show_command(scene: str, engine_name: str | None, dt: float, json_output: bo
 
     if scene.lower().endswith((".obj", ".stl")):
         name, rows = scene, mesh_rows(scene)
+    elif engine_name is None and (":" in scene or parsed(scene)[0] in engine_names()):
+        name, rows = scene, show.setting_rows(scene)
     else:
         loaded = load(scene)
         name, rows = loaded.name, show.scene_rows(loaded) if engine_name is None else show.built_rows(loaded, engine_name, dt)
-    print_json_or(json_output, rows, Document(name, [Table(rows, ["why"])]))
+    print_json_or(json_output, rows, Document(name, [Table(rows, ["why", "unit", "allowed"])]))

@@ -39,7 +39,8 @@ def engine_rows() -> Rows:
             continue
         choices = [f"{key} = {' | '.join(values)}" for key, values in found.choices.items()]
         numbers = [f"{key} = {allowed.least:g} … {allowed.most:g}" for key, allowed in found.numbers.items()]
-        options = "; ".join(choices + numbers)
+        settings = [f"{len(found.settings)} settings: dropspin show {name}"] if found.settings else []
+        options = "; ".join(choices + numbers + settings)
         summary = found.traits.summary if isinstance(found, StandIn) else (type(found).__doc__ or "").strip().partition("\n")[0]
         rows.append({"engine": name, "options": options, "summary": summary})
     return rows

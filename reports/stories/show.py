@@ -1,11 +1,12 @@
 """The output of `dropspin show`: a scene, or the model that an engine builds of the scene."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dropspin.comparisons.engines.base import EngineBroken
+from dropspin.comparisons.engines.options import spelled
 from dropspin.comparisons.judging.judge import verify_expectations
 from dropspin.reports.stories.numbers import bound
 from dropspin.reports.stories.scene import left_out, modelled
@@ -16,6 +17,7 @@ from dropspin.scenarios.state import VELOCITY
 from dropspin.scenarios.truths import Law, other_laws
 
 if TYPE_CHECKING:
+    from dropspin.comparisons.engines.base import Engine
     from dropspin.comparisons.running.inputs import EngineEntry
 
 Rows = list[dict[str, str]]
@@ -100,15 +102,62 @@ def _built(entry: "EngineEntry", scene: Scenario, dt: float) -> Rows:
     with engine.prepare(scene, dt) as simulation:
         verify_build(engine, scene, simulation, dt)
         built, settings = simulation.as_built(), verified_settings(simulation.settings)
-        rows = [
-            {"what": "engine", "is": engine.label, "why": ""},
-            {"what": "velocity lag", "is": f"{simulation.velocity_lag:g} s", "why": "time by which velocity lags position"},
-        ]
+        rows = [("engine", engine.label, ""), ("velocity lag", f"{simulation.velocity_lag:g} s", "time by which velocity lags position")]
     if built is not None:
         rows += [
-            {"what": "mass", "is": f"{built.mass!r} kg", "why": "read back"},
-            {"what": "inertia", "is": f"{built.inertia.tolist()} kg m²", "why": "read back"},
-            {"what": "gravity", "is": f"{built.gravity.tolist()} m/s²", "why": "read back"},
+            ("mass", f"{built.mass!r} kg", "read back"),
+            ("inertia", f"{built.inertia.tolist()} kg m²", "read back"),
+            ("gravity", f"{built.gravity.tolist()} m/s²", "read back"),
         ]
-    reasons = {} if settings.get("profile") == "default" else engine.reasons
-    return rows + [{"what": key, "is": str(value), "why": str(reasons.get(key, ""))} for key, value in settings.items()]
+    calibrated = settings
+    if not engine.is_calibrated and verified_refusal(engine.calibrated.refusal(scene)) is None:
+        with engine.calibrated.prepare(scene, dt) as simulation:
+            calibrated = verified_settings(simulation.settings)
+    facts = [{"what": what, "is": text, "source": "", "calibrated": "", "why": why} for what, text, why in rows]
+    return facts + _setting_rows(engine, settings, calibrated)
+
+
+def _setting_rows(engine: "Engine", found: Mapping[str, Any], calibrated: Mapping[str, Any]) -> Rows:
+    """The settings in force, each with its source, and with its calibrated value if that is another one."""
+    acting = {name: one for name, one in engine.settings.items() if not one.is_computed and engine.unmet_need(name) is None}
+    own = {name: setting.default for name, setting in acting.items()}
+    reasons = engine.reasons if engine.is_calibrated else {}
+
+    def text(name: str, value: Any) -> str:
+        return spelled(value) if name in engine.settings else str(value)
+
+    def source(name: str, value: Any) -> str:
+        if name in engine.options:
+            return "given"
+        if name not in engine.settings:
+            return ""
+        if text(name, value) == spelled(engine.settings[name].default):
+            return "engine's default"
+        return "computed" if engine.settings[name].is_computed else "calibrated"
+
+    rows = []
+    for name, value in ({**found, **{name: own[name] for name in own if name not in found}}).items():
+        other = calibrated.get(name, own.get(name))
+        differs = other is not None and text(name, other) != text(name, value)
+        why = str(reasons.get(name, ""))
+        rows.append([name, text(name, value), source(name, value), text(name, other) if differs else "", why])
+    return [dict(zip(("what", "is", "source", "calibrated", "why"), row, strict=True)) for row in rows]
+
+
+def setting_rows(engine_name: str) -> Rows:
+    """The options of an engine and the settings of its library: default, calibrated value, allowed values.
+
+    Raises:
+        DropspinError: There is no such engine, or it cannot be imported.
+    """
+    from dropspin.comparisons.running.entries import present_entry
+
+    engine = present_entry(engine_name).adapter
+    rows = [(name, values[0], "", " | ".join(values), "", "option of the adapter") for name, values in engine.choices.items()]
+    rows += [
+        (name, f"{one.default:g}", "", f"{one.least:g} … {one.most:g}", "", "option of the adapter") for name, one in engine.numbers.items()
+    ]
+    for name, one in engine.settings.items():
+        calibrated = "computed" if one.is_computed else "" if one.calibrated is None else spelled(one.calibrated)
+        rows.append((name, spelled(one.default), calibrated, one.allowed, one.unit, one.what))
+    return [dict(zip(("name", "default", "calibrated", "allowed", "unit", "what"), row, strict=True)) for row in rows]

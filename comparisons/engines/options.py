@@ -7,7 +7,6 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 from dropspin.comparisons.measuring.symmetries import REPRESENTED
 from dropspin.scenarios.errors import DropspinError, UnknownName
-from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import shown
 
 FEWEST_VALUES = 3
@@ -58,15 +57,15 @@ class Setting(NamedTuple):
     """
 
     default: Value
-    what: Text
+    what: str
     calibrated: Value | None = None
-    why: Text = ""
-    unit: Text = "1"
+    why: str = ""
+    unit: str = "1"
     least: float = 0.0
     most: float = math.inf
-    values: tuple[Text, ...] = ()
+    values: tuple[str, ...] = ()
     is_computed: bool = False
-    needs: tuple[tuple[Text, Text], ...] = ()
+    needs: tuple[tuple[str, str], ...] = ()
 
     @property
     def allowed(self) -> str:
@@ -184,8 +183,10 @@ class Configured:
         return [*self.choices, *self.numbers, *self.settings]
 
     def _default(self, option: str) -> str:
+        """An option's value where it is not given; of a setting, where it is not computed either."""
         if option in self.settings:
-            return spelled(self.profile_value(option))
+            default, _, calibrated, *_ = self.settings[option]
+            return spelled(default if self.is_default or calibrated is None else calibrated)
         return spelled(self.numbers[option].default) if option in self.numbers else self.choices[option][0]
 
     def option(self, name: str) -> str:
@@ -196,11 +197,6 @@ class Configured:
     def given(self) -> dict[str, Any]:
         """The values of the settings that were given."""
         return {name: self.settings[name].parsed(text) for name, text in self.options.items() if name in self.settings}
-
-    def profile_value(self, setting: str) -> Value:
-        """The value of a setting in the engine's profile where it is not computed."""
-        found = self.settings[setting]
-        return found.default if self.is_default or found.calibrated is None else found.calibrated
 
     def unmet_need(self, setting: str) -> tuple[str, str] | None:
         """An option with the value without which a setting has no effect; None if it has one."""

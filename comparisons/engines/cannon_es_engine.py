@@ -41,7 +41,7 @@ class CannonES(NodeEngine):
             return "cannon-es limits friction by the body's weight, not by the normal force; a ball or a box has to lie on the floor"
         return mapping.refusal_of_floor(scene, self.option("floor")) or mapping.refusal_of_rest_speed(scene, "cannon-es")
 
-    def settings(self, scene: Scenario, dt: float) -> dict[str, Any]:
+    def world_settings(self, scene: Scenario, dt: float) -> dict[str, Any]:
         floor, rates = scene.floor, scene.damping.rates if scene.damping else {"linear": 0.0, "angular": 0.0}
         damping = {f"{motion}Damping": float(-np.expm1(-rate)) for motion, rate in rates.items()}
         contact: dict[str, Any] = {"restitution": floor.restitution, "friction": mapping.friction_of(floor, GRIPPING)} if floor else {}

@@ -29,7 +29,7 @@ class NodeEngine(Engine):
     representations: ClassVar[tuple[str, ...]] = ("beside",)
 
     @abstractmethod
-    def settings(self, scene: Scenario, dt: float) -> dict[str, Any]:
+    def world_settings(self, scene: Scenario, dt: float) -> dict[str, Any]:
         """The engine's settings for a scene at a time step [s], as the driver takes them."""
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
@@ -46,7 +46,7 @@ class NodeSimulation(Simulation):
         floor = {"kind": options.get("floor", "plane"), "halfSize": mapping.FLOOR_HALF_SIZE} if scene.floor else None
         bodies = [_body(one) for one in mapping.bodies_in(scene, options["beside"])]
         given = {"dt": dt, "gravity": scene.acceleration.tolist(), "floor": floor, "bodies": bodies}
-        answer, _ = self._node.ask("open", world=self._world, settings=engine.settings(scene, dt), **given)
+        answer, _ = self._node.ask("open", world=self._world, settings=engine.world_settings(scene, dt), **given)
         self._built, self.velocity_lag = answer.get("built"), 0.5 * dt / answer["substeps"]
         self._state = self._ask(0)[0]
         self.settings = {"version": self._node.version, **options, **answer["settings"]}

@@ -39,7 +39,7 @@ class RapierJS(NodeEngine):
     def declines(self, scene: Scenario) -> str | None:
         return refusal(scene, self.option("floor"))
 
-    def settings(self, scene: Scenario, dt: float) -> dict[str, Any]:
+    def world_settings(self, scene: Scenario, dt: float) -> dict[str, Any]:
         parameters: dict[str, float] = {"dt": dt}
         decay = scene.damping.rates if scene.damping else {}
         if not self.is_default:

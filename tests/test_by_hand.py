@@ -18,7 +18,12 @@ PACKAGES = {
     "check_mujoco_warp.py": {"mujoco", "mujoco_warp", "warp"},
 }
 """The engine's packages that each program imports."""
-JAVASCRIPT = {"check_rapier_js.mjs": "@dimforge/rapier3d-compat", "check_cannon_es.mjs": "cannon-es"}
+JAVASCRIPT = {
+    "check_rapier_js.mjs": "@dimforge/rapier3d-compat",
+    "check_cannon_es.mjs": "cannon-es",
+    "check_jolt.mjs": "jolt-physics",
+    "check_havok.mjs": "@babylonjs/havok",
+}
 """The package of each program in JavaScript."""
 
 

@@ -21,7 +21,7 @@ NUMBERS = count()
 
 
 class NodeEngine(Engine):
-    """An engine in JavaScript; a subclass gives its `name`, its `package` of npm, its `settings`, and a driver."""
+    """An engine in JavaScript; a subclass gives its `name`, its `package` of npm, its `world_settings`, and a driver."""
 
     package: ClassVar[str]
     shapes: ClassVar = ("sphere", "box")

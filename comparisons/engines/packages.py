@@ -11,8 +11,8 @@ from pathlib import Path
 Version = tuple[int, ...]
 
 RAPIER_JS = "@dimforge/rapier3d-compat"
-CANNON_ES = "cannon-es"
-UNSCOPED = frozenset({CANNON_ES})
+CANNON_ES, JOLT, HAVOK = "cannon-es", "jolt-physics", "@babylonjs/havok"
+UNSCOPED = frozenset({CANNON_ES, JOLT})
 """Packages of npm whose names have no scope."""
 
 _distribution_version = cache(metadata.version)

@@ -12,19 +12,19 @@ WHY_FRICTION = f"{GRIPPING:g} where the floor grips; on both surfaces, as restit
 WHY_DAMPING = "(exp(rate dt) - 1)/dt: Rapier divides by 1 + c dt, which gives the scene's decay"
 
 
-def refusal(scene: Scenario, kind: str) -> str | None:
-    """Why Rapier cannot reproduce a scene on a floor of a kind, `plane`, `box` or `mesh`; None if it can."""
+def refusal(scene: Scenario, kind: str, engine: str = "Rapier") -> str | None:
+    """Why Rapier, or Havok, cannot reproduce a scene on a floor of a kind, `plane`, `box` or `mesh`; None if it can."""
     body, floor = scene.body, scene.floor
-    unfit = mapping.refusal_of_floor(scene, kind) or mapping.refusal_of_rest_speed(scene, "Rapier")
+    unfit = mapping.refusal_of_floor(scene, kind) or mapping.refusal_of_rest_speed(scene, engine)
     if unfit is not None or floor is None or floor.restitution == 0.0:
         return unfit
     if floor.friction != "none" and not (body.is_ball and floor.friction == "infinite"):
-        return "Rapier's friction does not respond to the rebound; a rough floor needs restitution 0, or a ball that it grips"
+        return f"{engine}'s friction does not respond to the rebound; a rough floor needs restitution 0, or a ball that it grips"
     truth = truth_for(scene)
     heights = [rotate(hit.before[ORIENTATION], body.vertices)[:, 1] for hit in truth.events] if truth else []
     landings = np.reshape(heights, (-1, len(body.vertices)))
     if np.any(np.sum(landings <= landings.min(axis=1, keepdims=True) + 1e-6 * body.size, axis=1) > 1):
-        return "Rapier applies restitution to one contact after another, each undoes those before; here several corners land at once"
+        return f"{engine} rebounds with another restitution where several corners land at once, as here"
     return None
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissing
 from dropspin.comparisons.engines.exceptions import described
-from dropspin.comparisons.engines.packages import CANNON_ES, RAPIER_JS, is_npm, npm_package
+from dropspin.comparisons.engines.packages import CANNON_ES, HAVOK, JOLT, RAPIER_JS, is_npm, npm_package
 from dropspin.scenarios.errors import DropspinError, UnknownName
 from dropspin.scenarios.model import EARLIER_NAMES
 from dropspin.scenarios.validation import shown
@@ -41,6 +41,8 @@ BUILT_IN = {"wang": _Home(f"{FOLDER}.wang", "Wang")} | {
         ("rapier", "Rapier", "rapier3d"),
         ("rapier-js", "RapierJS", RAPIER_JS, f"npm install {RAPIER_JS}, {WHERE}"),
         ("cannon-es", "CannonES", CANNON_ES, f"npm install {CANNON_ES}, {WHERE}"),
+        ("jolt", "Jolt", JOLT, f"npm install {JOLT}, {WHERE}"),
+        ("havok", "Havok", HAVOK, f"npm install {HAVOK}, {WHERE}"),
         ("dart", "Dart", "dartpy"),
         ("drake", "Drake", "pydrake"),
         ("sapien", "Sapien", "sapien"),

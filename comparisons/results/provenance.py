@@ -21,7 +21,8 @@ from dropspin.scenarios.text import printable
 
 MEASURING = ("dropspin", "numpy", "numba", "scipy")
 ENGINES = (
-    *("mujoco", "pybullet", "rapier3d", "@dimforge/rapier3d-compat", "cannon-es", "dartpy", "drake"),
+    *("mujoco", "pybullet", "rapier3d", "@dimforge/rapier3d-compat", "dartpy", "drake"),
+    *("cannon-es", "jolt-physics", "@babylonjs/havok"),
     *("mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang", "sapien", "exudyn", "jsbsim", "genesis-world", "quadrants", "torch"),
 )
 STAMPED = (*MEASURING, *ENGINES)

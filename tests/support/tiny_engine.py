@@ -13,7 +13,7 @@ class TinyEngine(NodeEngine):
     def declines(self, scene):
         return "bodies that do not turn, without a floor" if scene.floor or scene.damping or any(scene.start.angular_velocity) else None
 
-    def settings(self, scene, dt):
+    def world_settings(self, scene, dt):
         return {"lowest": -1e6}
 
 

@@ -195,7 +195,22 @@ def test_labels_are_canonical_and_unknown_options_get_suggestions():
     """The canonical form sorts options and leaves defaults out."""
     assert engine("mujoco[integrator=euler]").label == "mujoco"
     assert engine(" mujoco[ integrator = rk4 ]").label == "mujoco[integrator=rk4]"
-    extras = ["rapier", "rapier-js", "cannon-es", "dart", "drake", "sapien", "exudyn", "jsbsim", "mjx", "mujoco-warp", "newton", "genesis"]
+    extras = [
+        "rapier",
+        "rapier-js",
+        "cannon-es",
+        "jolt",
+        "havok",
+        "dart",
+        "drake",
+        "sapien",
+        "exudyn",
+        "jsbsim",
+        "mjx",
+        "mujoco-warp",
+        "newton",
+        "genesis",
+    ]
     assert engine_names() == ["wang", "mujoco", "pybullet", *extras]
     with pytest.raises(DropspinError, match=r"engine 'mujco' is unknown\. Did you mean 'mujoco'"):
         engine("mujco")

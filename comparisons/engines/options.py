@@ -215,7 +215,14 @@ class Configured:
     @property
     def calibrated(self) -> Self:
         """The engine with calibrated settings and its other options."""
-        return replace(self, options={name: text for name, text in self.options.items() if name not in ("profile", *self.settings)})
+        return self.without(["profile", *self.settings])
+
+    def without(self, names: Collection[str]) -> Self:
+        """The engine without some of its options, and without the settings that have no effect then."""
+        left = {name: text for name, text in self.options.items() if name not in names}
+        needs = {name: self.settings[name].needs for name in left if name in self.settings}
+        acting = {name for name in needs if all(left.get(option, self._default(option)) == value for option, value in needs[name])}
+        return replace(self, options={name: text for name, text in left.items() if name not in needs or name in acting})
 
     @property
     def label(self) -> str:

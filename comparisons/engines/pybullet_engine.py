@@ -105,7 +105,7 @@ class PyBullet(Engine):
             return f"Bullet omits the gyroscopic term if the product of the moments is below {SMALLEST_INERTIA:g}; scale the scene's units"
         if damping is not None and not self.is_default and max(damping.linear, damping.angular) > FASTEST_DECAY:
             return f"the adapter sets no decay faster than {FASTEST_DECAY:g} per second; Bullet's coefficient, 1 - exp(-rate), loses digits"
-        if damping is not None and self.is_multibody and not self.is_default:
+        if damping is not None and self.is_multibody and self.is_calibrated:
             return "Bullet's multibodies damp by another law, k v (1 + |v|)"
         unfit = refusal_of_hull(scene, "hull") if is_hull else None
         if unfit is not None or floor is None:

@@ -12,11 +12,14 @@ from typing import NamedTuple
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.judging.convergence import ADDED_STEPS, ARTEFACTS, Claim, Convergence, SeriesPoint, convergence
 from dropspin.comparisons.judging.judge import judge, judge_asymptotic_error, judge_order
+from dropspin.comparisons.judging.verdicts import FAILURES, Judgement
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metric import Metric
-from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
+from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.provenance import motion_digest
 from dropspin.comparisons.results.table import Case, Measurement
+from dropspin.comparisons.running.ablation import explaining, written_out
 from dropspin.comparisons.running.engine_run import EngineRun, run_engine
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
@@ -126,6 +129,31 @@ class EngineStudy:
                 yield extrapolated.measurement("order", name, "1", order, truths[metric.kind])
             if (error := judge_asymptotic_error(scene, self.claim, metric, found)) is not None:
                 yield extrapolated.measurement("asymptotic_error", name, metric.unit, error, truths[metric.kind])
+
+    def explaining_settings(self, rows: Sequence[Measurement]) -> Iterator[Measurement]:
+        """The changed settings that explain the error of the leading metric, or else the largest, that fails at the finest time step."""
+        scene, engine = self.own.scene, self.entry.engine
+        failing = [row for row in rows if row.verdict in FAILURES and row.kind in ("truth", "invariant") and row.metric not in ARTEFACTS]
+        if engine is None or engine.is_calibrated or not failing or self.own.truth is None:
+            return
+        dt = min(row.dt for row in failing)
+        sizes = {row.metric: abs(row.value) / scale(scene, row.unit) for row in failing if row.dt == dt}
+        leading = leading_metric(scene)
+        metric = METRICS[leading if leading in sizes else max(sizes, key=lambda name: sizes[name])]
+        options = self.processes.call(self.entry, written_out, scene, dt)
+        if isinstance(options, Breakdown):
+            return
+        phases = phases_at(self.own._replace(quick=True), dt)
+
+        def error_of(changed: Engine) -> float:
+            progress = Progress(scene.name, self.entry.label, dt, added=True)
+            outcome, _ = self._measured(engine_entry(changed), phases, progress, Timing())
+            return outcome.points[metric.name].average.value if metric.name in outcome.points else math.nan
+
+        case = Case(scene.name, self.entry.label, dt, scene.steps(dt))
+        changed = [name for name in options if name not in engine.calibrated.options]
+        for settings, share in explaining(replace(engine, options=options), changed, error_of).items():
+            yield case.measurement("setting", metric.name, "1", Judgement(share, "measured"), settings)
 
     @cached_property
     def claim(self) -> Claim:

@@ -64,7 +64,10 @@ def run_scene(
             distances += _distances_to_other_laws(own.scene, dt, phases, compared)
     for study in studies:
         study.calibrated = next(filter(study.is_default_of, studies), None)
-    judged = [row for study in studies for row in study.rows(is_extrapolated=is_sufficient(sorted(dts)))]
+    judged = []
+    for study in studies:
+        rows = list(study.rows(is_extrapolated=is_sufficient(sorted(dts))))
+        judged += [*rows, *study.explaining_settings(rows)]
     return _results(own, studies, [*judged, *distances], agreements, stamp)
 
 

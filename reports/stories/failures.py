@@ -14,12 +14,14 @@ from dropspin.comparisons.regressions.causes import WrongParameter, causes
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.running.processes import ResourceLimits
 from dropspin.reports.document import Paragraph, Part, Sentences
-from dropspin.reports.stories.numbers import bound, formatted, grouped, step, subject, word
+from dropspin.reports.stories.numbers import bound, formatted, grouped, in_ms, step, subject, word
 from dropspin.scenarios.text import counted, rounded
 
 Row = Mapping[Hashable, Any]
 MOST_NAMES = 4
 """Largest number of names in a sentence."""
+SEVERAL = 1.02
+"""Sum of shares from which on they are those of alternatives."""
 MOST_ON_PAGE, MOST_ON_TERMINAL = 24, 6
 """Largest number of sentences on the failures of one engine; JUnit, JSON and the report have all failures."""
 
@@ -106,7 +108,8 @@ def failure_parts(results: Results, failures: Sequence[Failure], baseline: str |
     parts: list[Part] = []
     for engine, of_engine in grouped(own, attrgetter("engine")).items():
         by_cause = grouped(of_engine, lambda failure: (failure.broke_down, failure.what if failure.broke_down else failure.scene))
-        explained, sentences = _consistent_with(results, engine), [f"✗ {_of_one_cause(alike)}" for alike in by_cause.values()]
+        explained = _consistent_with(results, engine) + settings_that_explain(results, engine)
+        sentences = [f"✗ {_of_one_cause(alike)}" for alike in by_cause.values()]
         for most, on_page in ((MOST_ON_PAGE, True), (MOST_ON_TERMINAL, False)):
             more = len(sentences) - most
             others = [f"✗ {engine} has {counted(more, 'more failure')}."] if more > 0 else []
@@ -125,6 +128,33 @@ def _consistent_with(results: Results, engine: str) -> list[str]:
     wrong = " or ".join(dict.fromkeys(map(_described, parameters)))
     listed = ", or with ".join(filter(None, [wrong, *(f"this fault: {fault.message}" for fault in faults)]))
     return [f"Consistent with {listed}."] if listed else []
+
+
+def settings_that_explain(results: Results, engine: str) -> list[str]:
+    """A sentence for each error that changed settings of an engine explain, and for all scenes in which they are the same."""
+    mine = results.table[(results.table["kind"] == "setting") & (results.table["engine"] == engine)].to_dict("records")
+    by_scene = grouped(mine, itemgetter("scene", "metric", "dt"))
+    alike = grouped(by_scene.items(), lambda one: (one[0][1], *(row["truth"] for row in one[1])))
+    sentences = []
+    for ((scene, metric, dt), rows), *others in alike.values():
+        also = f"; the same settings in {_listed([where for (where, *_), _ in others])}" if others else ""
+        what = f"of the {subject(metric, 'truth', '')} at {in_ms(dt)}"
+        sentences.append(f"{scene}: {_with_shares(rows, what)}{also}.")
+    return sentences
+
+
+def _with_shares(rows: Sequence[Row], what: str) -> str:
+    """The settings that explain an error, with their shares of it."""
+    names = [str(row["truth"]).replace(", ", " and ") for row in rows]
+    sizes = [f"{rounded(100.0 * row['value'], 3)} %" for row in rows]
+    explain = "explain" if ", " in rows[0]["truth"] else "explains"
+    if sum(row["value"] for row in rows) > SEVERAL:
+        return f"either {', or '.join(names)} {explain} {sizes[0]} {what}"
+    if explain == "explain":
+        return f"{names[0]} explain {sizes[0]} {what}, but only together"
+    return f"{names[0]} explains {sizes[0]} {what}" + "".join(
+        f", and {name} {size}" for name, size in zip(names[1:], sizes[1:], strict=True)
+    )
 
 
 def _described(wrong: WrongParameter) -> str:

@@ -1,0 +1,116 @@
+"""Which of an engine's changed settings explain an error: they are reverted one at a time, and in pairs where no single one is enough.
+
+The error to explain is the difference between the engine's error and that with all of them reverted. A setting's share of it is the part
+that reverting this one alone takes away. Reverting one of two settings may show nothing, as where a floor without restitution hides a
+threshold below which there is none: then pairs of those settings are tried that matter in some way, alone or beside the others.
+"""
+
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import combinations
+from types import MappingProxyType
+
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.engines.options import spelled
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.recording import verify_accepted
+from dropspin.comparisons.running.verification import verified_settings
+from dropspin.scenarios import DropspinError, Scenario
+
+Reverted = frozenset[str]
+ENOUGH = 0.9
+"""Share of an error that explains it."""
+NOTEWORTHY = 1e-3
+"""Least share that is stated."""
+ADDITIVE = 0.02
+"""Largest difference between the share of two settings and the sum of theirs where each has its own."""
+
+
+def shares(error: Callable[[Reverted], float], changed: Sequence[str]) -> dict[tuple[str, ...], float]:
+    """The settings that explain an error.
+
+    Args:
+        error: The error with some settings reverted; NaN if it is undefined.
+        changed: The names of all settings that were changed.
+
+    Returns:
+        The share of one setting, and that which a second one adds to it; or of two together, by both names, where their own shares do not
+        add up. Where the sum is above 1, these are alternatives. Empty if no one or two of them explain nine tenths of the error, or if
+        half of it or more is left with all of them reverted.
+    """
+    error = cache(error)
+    whole, calibrated = error(frozenset()), error(frozenset(changed))
+    if not abs(calibrated) < 0.5 * abs(whole):
+        return {}
+
+    def share(*names: str) -> float:
+        left = abs(error(frozenset(names)) - calibrated) / abs(whole - calibrated)
+        return 1.0 - left if left < math.inf else -math.inf
+
+    single = {name: share(name) for name in changed}
+    enough: dict[tuple[str, ...], float] = {(name,): of_it for name, of_it in single.items() if of_it >= ENOUGH}
+    if len(enough) == 1:
+        [(first,)] = enough
+        is_all = 1.0 - single[first] < NOTEWORTHY
+        added = {} if is_all else {(name,): share(first, name) - single[first] for name in changed if name != first}
+        second = max(added, key=lambda name: added[name], default=())
+        return enough | {name: more for name, more in added.items() if name == second and more >= NOTEWORTHY}
+    if enough:
+        return enough
+    beside = {name: 1.0 - share(*(other for other in changed if other != name)) for name in changed}
+    mattering = [name for name in changed if max(abs(single[name]), abs(beside[name])) >= NOTEWORTHY]
+    pairs: list[tuple[str, ...]] = list(combinations(mattering, 2))
+    most = max((share(*pair) for pair in pairs), default=0.0)
+    best = {pair: share(*pair) for pair in pairs if share(*pair) >= max(ENOUGH, most - ADDITIVE)}
+    if len(best) == 1:
+        [pair] = best
+        of_each: dict[tuple[str, ...], float] = {(name,): single[name] for name in pair}
+        if min(of_each.values()) >= NOTEWORTHY and abs(sum(of_each.values()) - most) <= ADDITIVE:
+            return of_each
+    return best
+
+
+def explaining(
+    engine: Engine, changed: Collection[str], error_of: Callable[[Engine], float], back: Mapping[str, str] = MappingProxyType({})
+) -> dict[str, float]:
+    """The changed options of an engine that explain its error: `shares` by option and value, such as `linearDamping=0.04`.
+
+    Args:
+        engine: The engine with its changed options.
+        changed: Their names.
+        error_of: The error of an engine; NaN if it is undefined.
+        back: The values to which they are reverted; the others are left out.
+    """
+
+    def error(names: Reverted) -> float:
+        left = engine.without(names)
+        try:
+            return error_of(replace(left, options={**left.options, **{name: back[name] for name in names if name in back}}))
+        except DropspinError:  # one of two settings that can be given together only
+            return math.nan
+
+    found = shares(error, list(changed))
+    return {", ".join(f"{name}={engine.options[name]}" for name in names): share for names, share in found.items()}
+
+
+def written_out(entry: EngineEntry, scene: Scenario, dt: float) -> dict[str, str]:
+    """The options that make an engine of the calibrated one, also if its profile is default; runs in the engine's process."""
+    engine = entry.adapter
+    if not engine.is_default:
+        return dict(engine.options)
+    calibrated, wanted = engine.calibrated, _in_force(engine, scene, dt)
+    found = _in_force(calibrated, scene, dt)
+    differing = {name: text for name, text in wanted.items() if text != (found[name] if name in found else calibrated.option(name))}
+    return {**calibrated.options, **differing}
+
+
+def _in_force(engine: Engine, scene: Scenario, dt: float) -> dict[str, str]:
+    """The settings and options of an engine that are in force in a scene, as text."""
+    verify_accepted(engine, scene)
+    with engine.prepare(scene, dt) as simulation:
+        found = verified_settings(simulation.settings)
+    own = {name: setting.default for name, setting in engine.settings.items() if engine.unmet_need(name) is None}
+    names = [name for name in (*engine.choices, *own) if name != "profile" and (name in found or name in own)]
+    return {name: spelled(found[name] if name in found else own[name]) for name in names}

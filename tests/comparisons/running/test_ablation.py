@@ -1,0 +1,101 @@
+"""Which changed settings explain an error: planted changes of one and of two settings, and functions of which the shares are known."""
+
+import pytest
+
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.running.ablation import explaining, shares, written_out
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.run import measure, run
+from dropspin.reports.stories.failures import settings_that_explain as settings_of
+from dropspin.scenarios import load
+
+pytestmark = pytest.mark.filterwarnings("ignore:contacts slip at", "ignore:in maximal coordinates")
+
+
+def settings_that_explain(label, scene_name, metric, duration=None):
+    """By setting, its share of the error of an engine, from one start at 1 ms."""
+    scene = load(scene_name)
+    scene = scene.model_copy(update={"duration": duration or scene.duration})
+    entry = engine_entry(label)
+    options = written_out(entry, scene, 1e-3)
+    written = type(entry.adapter)(options)
+    changed = [name for name in options if name not in written.calibrated.options]
+    return explaining(written, changed, lambda chosen: measure(scene, simulate(scene, chosen, 1e-3))[metric])
+
+
+BOUNCE, DRIFT = ("drop-ball", "bounce_height_error", 0.9), ("fall-spin", "energy_drift", 0.3)
+
+
+@pytest.mark.parametrize(
+    ("planted", "harmless", "where"),
+    [
+        ("pybullet[floor_restitution=0]", "", BOUNCE),
+        ("pybullet[linearDamping=0.04]", "frictionERP=0.2,erp=0.2", DRIFT),
+        ("pybullet[restitutionVelocityThreshold=6]", "contactSlop=1e-5,globalCFM=0", BOUNCE),
+        ("pybullet[lateralFriction=0.1]", "deterministicOverlappingPairs=0,warmStartingFactor=0.2", ("slide-box", "position_error", 0.5)),
+        ("pybullet[maxJointVelocity=20]", "coordinates=multibody,numSolverIterations=400", ("spin-principal-50", "energy_error", 0.2)),
+        ("mujoco[solref=-1000 0]", "iterations=50,ls_iterations=20", BOUNCE),
+        ("mujoco[cone=pyramidal]", "noslip_iterations=5", ("slide-box-askew", "position_error", 1.0)),
+        ("mujoco[solimp=0.9 0.95 0.001 0.5 2]", "island=enable,warmstart=disable", ("drop-box-edge", "bounce_height_error", None)),
+        # Two at a time.
+        ("pybullet[linearDamping=0.02,angularDamping=0.02]", "contactERP=0.2", DRIFT),
+        ("pybullet[floor_restitution=0,restitutionVelocityThreshold=6]", "contactSlop=1e-5", BOUNCE),
+        ("pybullet[floor_restitution=0.5,linearDamping=0.1]", "erp=0.2", BOUNCE),
+        ("mujoco[density=1.2,viscosity=0.5]", "cone=elliptic", DRIFT),
+    ],
+)
+def test_planted_settings_are_named_and_no_others(planted, harmless, where):
+    """Beside settings that differ too and matter nothing there."""
+    name, _, listed = planted.removesuffix("]").partition("[")
+    found = settings_that_explain(f"{name}[{','.join(filter(None, [listed, harmless]))}]", *where)
+    assert {one for names in found for one in names.split(", ")} == set(listed.split(","))
+    assert sum(found.values()) == pytest.approx(1.0, abs=0.02)
+
+
+def test_default_profiles_are_explained():
+    """MuJoCo's by its spring, which its cone or its impedance softens; Bullet's in flight by damping."""
+    found = settings_that_explain("mujoco[profile=default]", "drop-box-edge", "bounce_height_error")
+    assert found == {"solref=0.02 1, solimp=0.9 0.95 0.001 0.5 2": pytest.approx(1.0, abs=0.01)}
+    found = settings_that_explain("pybullet[profile=default]", *DRIFT)
+    assert list(found) == ["linearDamping=0.04", "angularDamping=0.04"]
+    assert sum(found.values()) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(("scene_name", "dt"), [("drop-ball", 2e-3), ("drop-box-edge", 2e-3), ("spin-damped", 2e-3), ("slide-box", 4e-3)])
+@pytest.mark.parametrize("name", ["mujoco", "pybullet"])
+def test_default_profile_is_the_calibrated_one_with_its_settings_written_out(name, scene_name, dt):
+    """The same motion: so the list of settings is complete. Bullet's own damping is in single precision."""
+    entry, scene = engine_entry(f"{name}[profile=default]"), load(scene_name)
+    written = engine(f"{name}").without([])
+    written = type(written)(written_out(entry, scene, dt))
+    assert written.options.keys() & {"profile"} == set()
+    default, again = (simulate(scene, chosen, dt).states for chosen in (entry.adapter, written))
+    assert again == pytest.approx(default, abs=1e-5 if name == "pybullet" else 0.0)
+
+
+def test_shares_of_known_functions():
+    def of(error, *changed):
+        return shares(lambda reverted: error(*(name not in reverted for name in changed)), changed)
+
+    assert of(lambda a, b, c: 0.7 * a + 0.3 * b + 0.0 * c, "a", "b", "c") == {("a",): pytest.approx(0.7), ("b",): pytest.approx(0.3)}
+    assert of(lambda a, b: 0.95 * a + 0.05 * b, "a", "b") == {("a",): pytest.approx(0.95), ("b",): pytest.approx(0.05)}
+    assert of(lambda a, b, c: a or b, "a", "b", "c") == {("a", "b"): 1.0}  # one hides the other
+    assert of(lambda a, b, c: a and b, "a", "b", "c") == {("a",): 1.0, ("b",): 1.0}  # alternatives
+    assert of(lambda a, b, c: a + b + c, "a", "b", "c") == {}  # three
+    assert of(lambda a, b: 1.0 + 0.2 * a, "a", "b") == {}  # the calibrated engine errs as much
+    assert of(lambda a, b: 0.1 if a else 1.0, "a", "b") == {}  # or more
+    assert of(lambda a, b: float("nan") if not a else 1.0, "a", "b") == {}  # it does not reach an end
+
+
+def test_run_states_the_settings_that_explain_a_failure():
+    ball = load("drop-ball").model_copy(update={"duration": 0.9})
+    results = run(ball, ["pybullet[floor_restitution=0,linear_damping=0.04]", "pybullet"], [2e-3], quick=True)
+    found = results.table[results.table["kind"] == "setting"].set_index("truth")["value"]
+    assert list(found.index) == ["floor_restitution=0", "linearDamping=0.04"]
+    assert found.sum() == pytest.approx(1.0, abs=1e-9)
+    label = "pybullet[floor_restitution=0,linearDamping=0.04]"
+    assert settings_of(results, label) == [
+        "drop-ball: floor_restitution=0 explains 97.9 % of the bounce height error at 2 ms, and linearDamping=0.04 2.05 %."
+    ]
+    assert settings_of(results, "pybullet") == []

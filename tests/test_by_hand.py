@@ -11,6 +11,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 PACKAGES = {
     "check_sapien.py": {"sapien"},
     "check_exudyn.py": {"exudyn"},
+    "check_ode.py": {"odepy"},
     "check_jsbsim.py": {"jsbsim"},
     "check_genesis.py": {"genesis"},
     "check_newton.py": {"newton", "warp"},

@@ -45,6 +45,7 @@ BUILT_IN = {"wang": _Home(f"{FOLDER}.wang", "Wang")} | {
         ("havok", "Havok", HAVOK, f"npm install {HAVOK}, {WHERE}"),
         ("dart", "Dart", "dartpy"),
         ("drake", "Drake", "pydrake"),
+        ("ode", "ODE", "odepy"),
         ("sapien", "Sapien", "sapien"),
         ("exudyn", "Exudyn", "exudyn"),
         ("jsbsim", "JSBSim", "jsbsim"),
@@ -55,6 +56,7 @@ BUILT_IN = {"wang": _Home(f"{FOLDER}.wang", "Wang")} | {
     )
 }
 CURES = {
+    r"ODE library not found": "install the library (Debian, Ubuntu: apt-get install libode8)",
     r"libGL\.so|libEGL\.so|libOSMesa": "install the system's OpenGL libraries (Debian, Ubuntu: apt-get install libgl1 libegl1)",
     r"libstdc\+\+.*GLIBCXX|GLIBC_\d": "its wheel needs a newer system; install a release that was built for this one",
     r"compiled using NumPy 1|numpy\.core\.multiarray|numpy\.dtype size changed": "install a release for this NumPy, or an older NumPy",

@@ -22,8 +22,8 @@ from dropspin.scenarios.text import printable
 MEASURING = ("dropspin", "numpy", "numba", "scipy")
 ENGINES = (
     *("mujoco", "pybullet", "rapier3d", "@dimforge/rapier3d-compat", "dartpy", "drake"),
-    *("cannon-es", "jolt-physics", "@babylonjs/havok"),
-    *("mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang", "sapien", "exudyn", "jsbsim", "genesis-world", "quadrants", "torch"),
+    *("cannon-es", "jolt-physics", "@babylonjs/havok", "ode-python", "sapien", "exudyn", "jsbsim", "genesis-world", "quadrants", "torch"),
+    *("mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang"),
 )
 STAMPED = (*MEASURING, *ENGINES)
 PACKAGES = tuple(Path(__file__).parents[2] / package for package in ("scenarios", "reference_impl", "comparisons"))

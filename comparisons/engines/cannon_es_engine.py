@@ -29,7 +29,7 @@ REASONS = {
 
 
 class CannonES(NodeEngine):
-    """A rigid body of cannon-es in Node.js, on a plane or on a box; or with the engine's defaults (profile=default)."""
+    """A rigid body of cannon-es in Node.js."""
 
     name, package, order, reasons = "cannon-es", CANNON_ES, 1.0, REASONS
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box"), "beside": mapping.BESIDE}

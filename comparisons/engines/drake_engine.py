@@ -34,7 +34,7 @@ REASONS = {
 
 
 class Drake(Engine):
-    """Drake's rigid body in the discrete plant, in free flight too."""
+    """Drake's rigid body in its discrete plant."""
 
     name = "drake"
     order = 1.0

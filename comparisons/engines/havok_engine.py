@@ -27,7 +27,7 @@ REASONS = {
 
 
 class Havok(NodeEngine):
-    """A rigid body of Havok in Node.js, on a box; or with the engine's defaults (profile=default)."""
+    """A rigid body of Havok in Node.js."""
 
     name, package, order, precision, reasons = "havok", HAVOK, 1.0, np.float32, REASONS
 

@@ -30,7 +30,7 @@ REASONS = {name: why for name, (_, why) in (SYSTEM | BODY).items()} | {
 
 
 class Jolt(NodeEngine):
-    """A rigid body of Jolt in Node.js, on a plane or on a box; or with the engine's defaults (profile=default)."""
+    """A rigid body of Jolt in Node.js."""
 
     name, package, order, precision, reasons = "jolt", JOLT, 1.0, np.float32, REASONS
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box"), "beside": mapping.BESIDE}

@@ -109,7 +109,7 @@ def flight_of(integrator: str, version: Version) -> str:
 
 
 class MuJoCo(Engine):
-    """MuJoCo with exact restitution: one free body and one explicit contact pair with the floor; or its defaults (profile=default)."""
+    """MuJoCo with exact restitution, or with its defaults."""
 
     name, mixes_scenes, shapes, takes_offsets, takes_walls = "mujoco", True, SHAPES, True, True
     choices: ClassVar = {

@@ -35,7 +35,7 @@ ode.dInitODE2(0)
 
 
 class ODE(Engine):
-    """A rigid body of ODE on a plane or on a box; or with the engine's defaults (profile=default)."""
+    """A rigid body of ODE, the Open Dynamics Engine."""
 
     name, order, reasons = "ode", 1.0, REASONS
     shapes: ClassVar = ("sphere", "box")

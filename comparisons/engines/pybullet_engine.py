@@ -48,7 +48,7 @@ COEFFICIENTS = ("restitution", "lateralFriction")
 
 
 class PyBullet(Engine):
-    """Bullet's rigid body on a plane, or on a large box (boxes); or with its defaults (profile=default)."""
+    """Bullet's rigid body on a plane, or on a large box."""
 
     name, order, reasons, shapes, takes_offsets, takes_walls = "pybullet", 1.0, REASONS, SHAPES, True, True
     choices: ClassVar = {

@@ -43,7 +43,7 @@ REASONS = {name: why for name, (_, why) in PARAMETERS.items()} | {
 
 
 class Rapier(Engine):
-    """Rapier's rigid body on a half-space, on a box, or on a mesh of two triangles."""
+    """Rapier's rigid body on a half-space, a box or a mesh."""
 
     name, order, precision, reasons = "rapier", 1.0, np.float32, REASONS
     shapes: ClassVar = ("sphere", "box")

@@ -30,7 +30,7 @@ REASONS = {name: why for name, (_, why) in PARAMETERS.items()} | {
 
 
 class RapierJS(NodeEngine):
-    """Rapier's rigid body in Node.js, on a half-space, a box or two triangles; or with Rapier's defaults (profile=default)."""
+    """Rapier's rigid body in Node.js."""
 
     name, package, order, precision, reasons = "rapier-js", RAPIER_JS, 1.0, np.float32, REASONS
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}

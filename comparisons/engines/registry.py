@@ -20,32 +20,34 @@ from dropspin.scenarios.validation import shown
 
 
 class _Home(NamedTuple):
-    """The module and class of an engine's adapter, and the package that it needs."""
+    """The module and class of an engine's adapter, the package that it needs, the command that installs it, and more about that."""
 
     module: str
     adapter: str
     package: str = ""
-    how_to_install: str = ""
+    command: str = ""
+    note: str = ""
 
 
 GROUP = "dropspin.engines"
 """The entry-point group in which other packages register engines: name = "module:Class"."""
 FOLDER = "dropspin.comparisons.engines"
-WHEELS = "(it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere it needs a compiler)"
-WHERE = "in the working folder or a folder above it"
+WHEELS = " (it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere it needs a compiler)"
+WHERE = ", in the working folder or a folder above it"
+LIBRARY = ", and ODE's library (Debian, Ubuntu: apt-get install libode8)"
 BUILT_IN = {"wang": _Home(f"{FOLDER}.wang", "Wang")} | {
-    name: _Home(f"{FOLDER}.{name.replace('-', '_')}_engine", adapter, package, *how_to_install or [f"pip install 'dropspin[{name}]'"])
-    for name, adapter, package, *how_to_install in (
+    name: _Home(f"{FOLDER}.{name.replace('-', '_')}_engine", adapter, package, *command or [f"pip install 'dropspin[{name}]'"])
+    for name, adapter, package, *command in (
         ("mujoco", "MuJoCo", "mujoco", "pip install mujoco"),
-        ("pybullet", "PyBullet", "pybullet", f"pip install pybullet {WHEELS}"),
+        ("pybullet", "PyBullet", "pybullet", "pip install pybullet", WHEELS),
         ("rapier", "Rapier", "rapier3d"),
-        ("rapier-js", "RapierJS", RAPIER_JS, f"npm install {RAPIER_JS}, {WHERE}"),
-        ("cannon-es", "CannonES", CANNON_ES, f"npm install {CANNON_ES}, {WHERE}"),
-        ("jolt", "Jolt", JOLT, f"npm install {JOLT}, {WHERE}"),
-        ("havok", "Havok", HAVOK, f"npm install {HAVOK}, {WHERE}"),
+        ("rapier-js", "RapierJS", RAPIER_JS, f"npm install {RAPIER_JS}", WHERE),
+        ("cannon-es", "CannonES", CANNON_ES, f"npm install {CANNON_ES}", WHERE),
+        ("jolt", "Jolt", JOLT, f"npm install {JOLT}", WHERE),
+        ("havok", "Havok", HAVOK, f"npm install {HAVOK}", WHERE),
         ("dart", "Dart", "dartpy"),
         ("drake", "Drake", "pydrake"),
-        ("ode", "ODE", "odepy"),
+        ("ode", "ODE", "odepy", "pip install 'dropspin[ode]'", LIBRARY),
         ("sapien", "Sapien", "sapien"),
         ("exudyn", "Exudyn", "exudyn"),
         ("jsbsim", "JSBSim", "jsbsim"),
@@ -81,7 +83,7 @@ def engine(name: str) -> Engine:
     """The engine of a name with options, such as `mujoco[integrator=rk4]`, or of a class, such as `my_module:MyEngine`.
 
     Args:
-        name: The name; `dropspin list engines` lists the engines and their options.
+        name: The name; `dropspin list engines` lists the engines, and `dropspin show NAME` the options of one.
 
     Returns:
         The engine, with its options.
@@ -126,8 +128,8 @@ def _adapter(base: str) -> type[Engine]:
     if base in BUILT_IN:
         home = BUILT_IN[base]
         # Checked before the import of the adapter, which imports its engine.
-        if home.package and (absence := _absence(home)):
-            raise EngineMissing(f"{base} is not installed: {absence}.")
+        if absent := absence(base):
+            raise EngineMissing(f"{base} is not installed: {absent}{home.note if absent == home.command else ''}.")
         try:
             return getattr(import_module(home.module), home.adapter)
         except (Exception, SystemExit) as error:
@@ -143,16 +145,17 @@ def _adapter(base: str) -> type[Engine]:
     return _imported(base, brought[base].module, brought[base].attr)
 
 
-def _absence(home: _Home) -> str:
-    """What an engine lacks, or how to install it; empty if it is installed."""
+def absence(base: str) -> str:
+    """What a built-in engine lacks, or the command that installs it; empty if it is installed, and for other engines."""
+    home = BUILT_IN.get(base, _Home("", ""))
     if not is_npm(home.package):
-        return home.how_to_install if find_spec(home.package) is None else ""
+        return home.command if home.package and find_spec(home.package) is None else ""
     if which("node") is None:
         return "it runs in Node.js, and there is no node on PATH"
     with suppress(PackageNotFoundError):
         npm_package(home.package)
         return ""
-    return home.how_to_install
+    return home.command
 
 
 def _entry_points() -> dict[str, EntryPoint]:

@@ -24,7 +24,7 @@ from dropspin.scenarios.surfaces import Floor, Surface
 
 
 class Wang(Engine):
-    """Algorithms 1 and 2 of Wang's lecture note; each option replaces one of their parts by another method."""
+    """Algorithms 1 and 2 of Wang's lecture note."""
 
     name = "wang"
     shapes, takes_offsets, takes_walls = SHAPES, True, True

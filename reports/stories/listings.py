@@ -1,6 +1,5 @@
 """The output of `dropspin list`: the scenes, the engines, the metrics."""
 
-from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.loading import load, names
 from dropspin.scenarios.problems import problems
 
@@ -25,24 +24,25 @@ def scene_rows() -> Rows:
 
 
 def engine_rows() -> Rows:
-    """The engines that can be chosen by name, with their options."""
-    from dropspin.comparisons.engines.registry import engine_names
+    """The engines that can be chosen by name: whether they are installed, what they are or how to install them, and their options."""
+    from dropspin.comparisons.engines.registry import absence, engine_names
     from dropspin.comparisons.engines.stand_in import StandIn
-    from dropspin.comparisons.running.entries import present_entry
+    from dropspin.comparisons.running.entries import engine_entry
 
     rows = []
     for name in engine_names():
-        try:
-            found = present_entry(name).adapter
-        except DropspinError as error:
-            rows.append({"engine": name, "options": "", "summary": str(error)})
+        entry = engine_entry(name)
+        if entry.engine is None:
+            installed = "no" if entry.absence == "missing" else entry.absence
+            rows.append({"engine": name, "installed": installed, "summary": absence(name) or entry.reason, "options": ""})
             continue
+        found = entry.adapter
         choices = [f"{key} = {' | '.join(values)}" for key, values in found.choices.items()]
         numbers = [f"{key} = {allowed.least:g} … {allowed.most:g}" for key, allowed in found.numbers.items()]
         settings = [f"{len(found.settings)} settings: dropspin show {name}"] if found.settings else []
         options = "; ".join(choices + numbers + settings)
         summary = found.traits.summary if isinstance(found, StandIn) else (type(found).__doc__ or "").strip().partition("\n")[0]
-        rows.append({"engine": name, "options": options, "summary": summary})
+        rows.append({"engine": name, "installed": "yes", "summary": summary, "options": options})
     return rows
 
 

@@ -4,6 +4,7 @@ import sys
 from importlib.metadata import PackageNotFoundError
 
 import pytest
+from support.cli import dropspin
 
 from dropspin.comparisons.engines import registry
 from dropspin.comparisons.engines.base import EngineMissing
@@ -56,3 +57,18 @@ def test_a_missing_package_and_a_missing_node_are_named(folders, monkeypatch):
     monkeypatch.setattr(registry, "which", lambda name: None)
     with pytest.raises(EngineMissing, match=r"^rapier-js is not installed: it runs in Node\.js, and there is no node on PATH\.$"):
         registry.engine("rapier-js")
+
+
+def test_list_of_engines_fits_80_columns_and_has_the_command_that_installs_each(folders, monkeypatch):
+    def listed():
+        done = dropspin("list", "engines", cwd=folders[2])
+        assert max(map(len, done.stdout.splitlines())) <= 80
+        return {line.split()[0]: line.split(maxsplit=2)[1:] for line in done.stdout.splitlines()}
+
+    assert listed()["wang"][0] == "yes"
+    monkeypatch.setattr(registry, "find_spec", lambda name: None)
+    monkeypatch.setattr(registry, "which", lambda name: name)
+    missing = listed()
+    assert missing["mujoco"] == ["no", "pip install mujoco"]
+    assert missing["drake"] == ["no", "pip install 'dropspin[drake]'"]
+    assert missing["havok"] == ["no", "npm install @babylonjs/havok"]

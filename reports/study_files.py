@@ -77,13 +77,14 @@ def read_study(folder: str) -> Document:
     from dropspin.reports.stories.diagnose import Diagnosed
     from dropspin.reports.stories.limits import Limits
     from dropspin.reports.stories.log_check import CheckedLog
+    from dropspin.reports.stories.log_compare import ComparedLog
+    from dropspin.reports.stories.log_fit import FittedLog
     from dropspin.reports.stories.reproduce import Reproduction
     from dropspin.reports.stories.symmetries import Symmetries
     from dropspin.reports.stories.tradeoff import TradeOffs
 
-    studies: TypeAdapter[Study] = TypeAdapter(
-        Annotated[CheckedLog | Diagnosed | Limits | Reproduction | Symmetries | TradeOffs, Field(discriminator="study")]
-    )
+    kinds = CheckedLog | ComparedLog | Diagnosed | FittedLog | Limits | Reproduction | Symmetries | TradeOffs
+    studies: TypeAdapter[Study] = TypeAdapter(Annotated[kinds, Field(discriminator="study")])
     try:
         document = studies.validate_json(read_stored(Path(folder), SECTION)).document()
         charts = [chart_data(chart) for part in document.parts if isinstance(part, Charts) for chart in part.charts]

@@ -31,9 +31,8 @@ def diagnose_command(file: str, output: str, json_output: bool, **options: Any) 
     """
     from dropspin.comparisons.diagnosis.study import diagnose
     from dropspin.comparisons.results.folder import study_folder
-    from dropspin.reports.html.study import study_page
+    from dropspin.reports.html.study import write_study_and_page
     from dropspin.reports.stories.diagnose import Diagnosed
-    from dropspin.reports.study_files import write_parquet, write_study
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.reports.terminal.rows import print_json_or
 
@@ -41,8 +40,6 @@ def diagnose_command(file: str, output: str, json_output: bool, **options: Any) 
         with share_bar(os.path.basename(file)) as on_progress:
             found = diagnose(file, **options, on_progress=on_progress)
         study = Diagnosed(diagnosis=found)
-        document = write_study(study, folder)
-        write_parquet(study, folder)
-        (folder / "report.html").write_text(study_page(document), encoding="utf-8")
+        document = write_study_and_page(study, folder)
     print_json_or(json_output, study.rows(), document, os.path.join(output, "report.html"))
     return int(found.failed)

@@ -24,17 +24,15 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
     from dropspin.comparisons.logs.check import log_check
     from dropspin.comparisons.logs.replay import scenes_of
     from dropspin.comparisons.results.folder import study_folder
-    from dropspin.reports.html.study import study_page
+    from dropspin.reports.html.study import write_study_and_page
     from dropspin.reports.stories.log_check import CheckedLog
-    from dropspin.reports.study_files import write_parquet, write_scenes, write_study, write_toml
+    from dropspin.reports.study_files import write_scenes, write_toml
     from dropspin.reports.terminal.rows import print_json_or
 
     with study_folder(output) as folder:
         check = log_check(recording)
         study = CheckedLog.of(recording, check)
-        document = write_study(study, folder)
-        write_parquet(study, folder)
-        (folder / "report.html").write_text(study_page(document), encoding="utf-8")
+        document = write_study_and_page(study, folder)
         write_toml(check.corrected, folder / "corrected.toml")
         if check.reads_the_columns_right and check.flights.log.header.floor is not None:
             write_scenes(scenes_of(check.flights), folder / "scenes")

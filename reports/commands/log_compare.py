@@ -1,10 +1,11 @@
 """`dropspin log compare`."""
 
+import os
 from typing import Any
 
 import click
 
-from dropspin.reports.commands.options import as_json, engines_option, jobs_option, time_limit_option
+from dropspin.reports.commands.options import as_json, engines_option, jobs_option, output_option, time_limit_option
 
 
 @click.command("compare")
@@ -13,24 +14,31 @@ from dropspin.reports.commands.options import as_json, engines_option, jobs_opti
 @click.option("--fit", "fits", is_flag=True, help="Fit friction and restitution of each engine first, to find their part of its error.")
 @time_limit_option(300.0, "an engine may use for all tosses")
 @jobs_option("engines")
+@output_option("out/log-compare", "for the tables and the report")
 @as_json
-def log_compare_command(recording: str, fits: bool, json_output: bool, **options: Any) -> None:
+def log_compare_command(recording: str, fits: bool, output: str, json_output: bool, **options: Any) -> None:
     """Compare engines with the tosses of a recording, each from the state at the end of its flight.
 
     RECORDING is a header, a TOML file that names the body, the units and the file of data; or toss-cube, 100 measured tosses of a cube.
-    Correct what dropspin log check finds first. The default engines are mujoco and wang[contact=sequential,law=coulomb], and
+    Give corrected.toml, which dropspin log check writes. The default engines are mujoco and wang[contact=sequential,law=coulomb], and
     mujoco and pybullet in their default profiles.
     """
+    from dropspin.comparisons.logs.check import log_check
     from dropspin.comparisons.logs.compare import ENGINES, log_compare
     from dropspin.comparisons.logs.fit import log_fit
     from dropspin.comparisons.logs.replay import flights_in
-    from dropspin.reports.stories.log_compare import as_data, document
+    from dropspin.comparisons.results.folder import study_folder
+    from dropspin.reports.html.study import write_study_and_page
+    from dropspin.reports.stories.log_compare import ComparedLog
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.reports.terminal.rows import print_json_or
 
     options["engines"] = options["engines"] or ENGINES
-    with share_bar(recording) as on_progress:
-        flights = flights_in(recording)
-        fit = log_fit(flights, **options, on_progress=on_progress) if fits else None
-        found = log_compare(flights, fit=fit, **options, on_progress=on_progress)
-    print_json_or(json_output, as_data(found), document(found))
+    with study_folder(output) as folder:
+        with share_bar(recording) as on_progress:
+            flights = flights_in(recording)
+            fit = log_fit(flights, **options, on_progress=on_progress) if fits else None
+            found = log_compare(flights, fit=fit, **options, on_progress=on_progress)
+        study = ComparedLog(recording=recording, findings=list(log_check(flights).findings), comparison=found)
+        document = write_study_and_page(study, folder)
+    print_json_or(json_output, study.rows(), document, os.path.join(output, "report.html"))

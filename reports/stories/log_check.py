@@ -13,7 +13,7 @@ from dropspin.reports.document import Charts, Document, Heading, Paragraph, Sent
 from dropspin.reports.plots.chart import Chart, Line
 from dropspin.reports.stories.log_findings import sentence, texts
 from dropspin.reports.stories.numbers import formatted, grouped
-from dropspin.reports.stories.study import Study
+from dropspin.reports.stories.study import Study, with_all_columns
 from dropspin.scenarios.text import counted
 
 SMALL = 0.1
@@ -47,8 +47,7 @@ class CheckedLog(Study):
         rows = [{"row": "values", **asdict(value), "note": self._note(value)} for value in self.values]
         rows += [{"row": "findings", **asdict(finding), **texts(finding)} for finding in self.findings]
         rows += [{"row": "tosses", **asdict(toss)} for toss in self.tosses]
-        columns = dict.fromkeys(name for row in rows for name in row)
-        return [{name: row.get(name) for name in columns} for row in rows]
+        return with_all_columns(rows)
 
     def document(self) -> Document:
         """The values, the findings, and on a page the tosses."""

@@ -2,62 +2,107 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import asdict
+from typing import Any, Literal
 
 from dropspin.comparisons.logs.compare import Error, LogComparison, Pair
-from dropspin.reports.document import Document, Heading, Sentences, Table
+from dropspin.comparisons.logs.log import Finding
+from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
+from dropspin.reports.plots.chart import Chart
+from dropspin.reports.plots.intervals import Interval, interval_rows
+from dropspin.reports.stories.log_findings import corrections
 from dropspin.reports.stories.numbers import formatted, grouped, left_out
+from dropspin.reports.stories.study import Study, with_all_columns
 
-DEGREES = 180.0 / math.pi
-
-
-def as_data(found: LogComparison) -> dict[str, Any]:
-    """The results, with all digits."""
-    parts = ("tosses", "length", "dt", "errors", "pairs", "groups", "parts", "left_out")
-    return {part: getattr(found, part) for part in parts}
-
-
-def document(found: LogComparison) -> Document:
-    """The errors, the groups, the differences and the parts."""
-    legend = (
-        f"Means over {found.tosses} tosses with 95 % intervals; in brackets the noise floor, due to the errors of the measured start. "
-        f"Distances are shares of {1e3 * found.length:.4g} mm, the largest extent of the body; energies are shares of that at the start."
-    )
-    return Document(
-        "Engines compared with measured tosses",
-        [
-            Table(_error_rows(found.errors), left_out_first=["at impact", "0.1 s later"]),
-            Sentences([legend]),
-            Heading("Differences between engines", on_terminal=True),
-            Table([_pair_row(pair) for pair in found.pairs]),
-            Sentences([*_group_sentences(found), *left_out(found.left_out)]),
-            Heading("Parts of the mean errors over the motion", on_terminal=True),
-            Table(_part_rows(found)),
-            Sentences(
-                [
-                    "Parts are what an error loses when one thing after another is improved: the centre of mass by the flights, "
-                    "fitted friction and restitution, half of the time step; then the noise floor. The rest is due to the model of contact."
-                ]
-            ),
-        ],
-    )
-
-
+UNITS = {"1": (100.0, " [%]"), "rad": (180.0 / math.pi, " [°]"), "s": (1.0, " [s]")}
+"""The factor with which values of a unit are shown, and the unit in which they are."""
+OF = {"position": UNITS["1"], "orientation": UNITS["rad"]}
+"""The same for the quantities of differences and parts."""
+LEGEND = (
+    "Means over {tosses} tosses with 95 % intervals; in brackets the noise floor, due to the errors of the measured start. Positions are "
+    "in percent of {length:.4g} mm, the largest extent of the body, and energies in percent of that at the start."
+)
+IMPROVED = (
+    "Parts are what an error loses when one thing after another is improved: the centre of mass by the flights, fitted friction and "
+    "restitution, half of the time step; then the noise floor. The rest is due to the model of contact. A "
+    "negative part is an increase."
+)
 AT = {"impact": "at impact", "+0.1 s": "0.1 s later", "mean": "mean over the motion", "end": "at the end"}
+
+
+class ComparedLog(Study):
+    """What `dropspin log compare` found."""
+
+    study: Literal["log_compare"] = "log_compare"
+    recording: str
+    findings: list[Finding]
+    comparison: LogComparison
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Every error, difference, group and part, and a row for each engine left out."""
+        found = self.comparison
+        rows = [{"row": part, **asdict(row)} for part in ("errors", "pairs", "parts") for row in getattr(found, part)]
+        rows += [{"row": "groups", "quantity": quantity, "engines": group} for quantity, groups in found.groups.items() for group in groups]
+        return with_all_columns([*rows, *({"row": "left out", "engine": engine, "reason": why} for engine, why in found.left_out.items())])
+
+    def document(self) -> Document:
+        """The errors, the groups, the differences and the parts."""
+        found, parts = self.comparison, list[Part]()
+        if found.errors:
+            parts += [
+                Table(_error_rows(found.errors), left_out_first=["at impact", "0.1 s later"]),
+                Paragraph(LEGEND.format(tosses=found.tosses, length=1e3 * found.length)),
+                Charts("errors", [_error_chart(quantity, found.errors) for quantity in OF]),
+            ]
+        if found.pairs:
+            parts += [
+                Heading("Differences between engines", on_terminal=True),
+                Table([_pair_row(pair) for pair in found.pairs]),
+                Charts("differences", [_pair_chart(quantity, found.pairs) for quantity in OF]),
+            ]
+        parts.append(Sentences([*_group_sentences(found), *left_out(found.left_out)]))
+        if found.parts:
+            heading = Heading("Parts of the mean errors over the motion", on_terminal=True)
+            parts += [heading, Table(_part_rows(found)), Paragraph(IMPROVED)]
+        return Document(
+            f"Engines compared with {self.recording}", parts, [Sentences(corrections(self.recording, self.findings), style="bold")]
+        )
+
+
+def _error_chart(quantity: str, errors: Sequence[Error]) -> Chart:
+    """The mean error of each engine over the motion."""
+    scale, unit = OF[quantity]
+    shown = [error for error in errors if (error.quantity, error.at) == (quantity, "mean")]
+    rows = [
+        Interval(error.engine, scale * error.value, scale * error.lower, scale * error.upper, scale * error.noise_floor) for error in shown
+    ]
+    return interval_rows(f"error of {quantity}{unit}", rows, "noise floor")
+
+
+def _pair_chart(quantity: str, pairs: Sequence[Pair]) -> Chart:
+    """The differences between engines."""
+    scale, unit = OF[quantity]
+    shown = [pair for pair in pairs if pair.quantity == quantity]
+    rows = [Interval(_label(pair), scale * pair.difference, scale * pair.lower, scale * pair.upper, 0.0) for pair in shown]
+    return interval_rows(f"difference of {quantity}{unit}", rows, "no difference")
+
+
+def _label(pair: Pair) -> str:
+    return f"{pair.first} − {pair.second}"
 
 
 def _error_rows(errors: Sequence[Error]) -> list[dict[str, str]]:
     rows = []
     for (engine, quantity), kinds in grouped(errors, lambda error: (error.engine, error.quantity)).items():
-        unit = {"rad": " [°]", "s": " [s]"}.get(kinds[0].unit, "")
+        unit = UNITS[kinds[0].unit][1]
         cells = {error.at: _cell(error) for error in kinds}
         rows.append({"engine": engine, "error": quantity + unit} | {name: cells.get(at, "") for at, name in AT.items()})
     return rows
 
 
 def _cell(error: Error) -> str:
-    factor = DEGREES if error.unit == "rad" else 1.0
-    return f"{interval(factor * error.value, factor * error.lower, factor * error.upper)} ({formatted(factor * error.noise_floor)})"
+    scale, _ = UNITS[error.unit]
+    return f"{interval(scale * error.value, scale * error.lower, scale * error.upper)} ({formatted(scale * error.noise_floor)})"
 
 
 def interval(value: float, lower: float, upper: float) -> str:
@@ -66,11 +111,11 @@ def interval(value: float, lower: float, upper: float) -> str:
 
 
 def _pair_row(pair: Pair) -> dict[str, str]:
-    factor, unit = (DEGREES, " [°]") if pair.quantity == "orientation" else (1.0, "")
+    scale, unit = OF[pair.quantity]
     return {
-        "engines": f"{pair.first} − {pair.second}",
+        "engines": _label(pair),
         "error": pair.quantity + unit,
-        "difference": interval(factor * pair.difference, factor * pair.lower, factor * pair.upper),
+        "difference": interval(scale * pair.difference, scale * pair.lower, scale * pair.upper),
         "differ": "yes" if pair.differs else "not significantly",
     }
 
@@ -92,7 +137,7 @@ def _group_sentences(found: LogComparison) -> list[str]:
 def _part_rows(found: LogComparison) -> list[dict[str, str]]:
     rows = []
     for (engine, quantity), parts in grouped(found.parts, lambda part: (part.engine, part.quantity)).items():
-        factor, unit = (DEGREES, " [°]") if quantity == "orientation" else (1.0, "")
-        cells = {part.part: interval(factor * part.value, factor * part.lower, factor * part.upper) for part in parts}
+        scale, unit = OF[quantity]
+        cells = {part.part: interval(scale * part.value, scale * part.lower, scale * part.upper) for part in parts}
         rows.append({"engine": engine, "error": quantity + unit, **cells})
     return rows

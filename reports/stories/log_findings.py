@@ -1,6 +1,7 @@
 """Sentences on what is wrong with a recording: what was found, the causes, what shows or separates them, and the remedy."""
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 from dropspin.comparisons.logs.log import Cause, Finding
@@ -83,6 +84,14 @@ def sentence(finding: Finding) -> str:
     shown = f" {'Separated' if several else 'Shown'} by: {parts['shown']}." if parts["shown"] else ""
     remedy = f" Remedy: {parts['remedy']}." if parts["remedy"] else ""
     return capitalized(f"{parts['what']}{causes}.{shown}{remedy}")
+
+
+def corrections(recording: str, findings: Iterable[Finding]) -> list[str]:
+    """What to correct in the header before engines are compared with a recording."""
+    found = [sentence(finding) for finding in findings if any(cause.keys for cause in finding.causes)]
+    if found:
+        found.append(f"Correct the header first: dropspin log check {recording} writes corrected.toml, with these remedies.")
+    return found
 
 
 def texts(finding: Finding) -> dict[str, Any]:

@@ -1,11 +1,16 @@
 """The output of `dropspin log fit`: friction and restitution by engine, and what engines disagree on."""
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import asdict
+from typing import Any, Literal
 
 from dropspin.comparisons.logs.fit import Disagreement, Estimate, LogFit
-from dropspin.reports.document import Document, Sentences, Table
+from dropspin.comparisons.logs.log import Finding
+from dropspin.reports.document import Charts, Document, Sentences, Table
+from dropspin.reports.plots.intervals import Interval, interval_rows
+from dropspin.reports.stories.log_findings import corrections
 from dropspin.reports.stories.numbers import formatted, grouped, left_out
+from dropspin.reports.stories.study import Study, with_all_columns
 
 DISAGREEMENTS: Mapping[str, str] = {
     "restitution": "it is a setting of the engine, not a property of the body",
@@ -17,30 +22,46 @@ NOT_IDENTIFIED: Mapping[str, str] = {
 }
 
 
-def as_data(fit: LogFit) -> dict[str, Any]:
-    """The results, with all digits."""
-    return {"tosses": fit.tosses, "frames": fit.frames, "estimates": fit.estimates, "disagreements": fit.disagreements}
+class FittedLog(Study):
+    """What `dropspin log fit` found."""
 
+    study: Literal["log_fit"] = "log_fit"
+    recording: str
+    findings: list[Finding]
+    fit: LogFit
 
-def document(fit: LogFit) -> Document:
-    """A row for each engine, and a sentence for each disagreement and each parameter that the tosses do not identify."""
-    rows = []
-    for engine, estimates in grouped(fit.estimates, lambda estimate: estimate.engine).items():
-        cells = {estimate.parameter: interval(estimate) for estimate in estimates}
-        rows.append({"engine": engine, **cells, "discrepancy": f"{formatted(1e3 * fit.discrepancies[engine])} mm"})
-    legend = (
-        f"From {fit.frames} frames after the flight of each of {fit.tosses} tosses, with 95 % intervals. The discrepancy is what an engine "
-        "leaves of these frames beside the noise of the recording and the errors of the start."
-    )
-    unknown = [
-        f"{one.parameter.capitalize()} is not identified with {one.engine}: {NOT_IDENTIFIED[one.parameter]}."
-        for one in fit.estimates
-        if not one.has_lower and not one.has_upper
-    ]
-    return Document(
-        "Friction and restitution of measured tosses",
-        [Table(rows), Sentences([legend, *unknown, *map(disagreement, fit.disagreements), *left_out(fit.left_out)])],
-    )
+    def rows(self) -> list[dict[str, Any]]:
+        """Every estimate and every disagreement, and a row for each engine left out."""
+        fit = self.fit
+        rows = [{"row": "estimates", **asdict(one), "discrepancy": fit.discrepancies[one.engine]} for one in fit.estimates]
+        rows += [{"row": "disagreements", **asdict(one)} for one in fit.disagreements]
+        return with_all_columns([*rows, *({"row": "left out", "engine": engine, "reason": why} for engine, why in fit.left_out.items())])
+
+    def document(self) -> Document:
+        """A row for each engine, and a sentence for each disagreement and each parameter that the tosses do not identify."""
+        fit, rows = self.fit, []
+        for engine, estimates in grouped(fit.estimates, lambda estimate: estimate.engine).items():
+            cells = {estimate.parameter: interval(estimate) for estimate in estimates}
+            rows.append({"engine": engine, **cells, "discrepancy": f"{formatted(1e3 * fit.discrepancies[engine])} mm"})
+        legend = (
+            f"From {fit.frames} frames after the flight of each of {fit.tosses} tosses, with 95 % intervals. The discrepancy is what an "
+            "engine leaves of these frames beside the noise of the recording and the errors of the start."
+        )
+        unknown = [
+            f"{one.parameter.capitalize()} is not identified with {one.engine}: {NOT_IDENTIFIED[one.parameter]}."
+            for one in fit.estimates
+            if not one.has_lower and not one.has_upper
+        ]
+        charts = [
+            interval_rows(parameter, [Interval(one.engine, one.value, one.lower, one.upper) for one in of_one])
+            for parameter, of_one in grouped(fit.estimates, lambda estimate: estimate.parameter).items()
+        ]
+        sentences = [legend, *unknown, *map(disagreement, fit.disagreements), *left_out(fit.left_out)]
+        return Document(
+            f"Friction and restitution of {self.recording}",
+            [Table(rows), *([Charts("coefficients", charts)] if charts else []), Sentences(sentences)],
+            [Sentences(corrections(self.recording, self.findings), style="bold")],
+        )
 
 
 def interval(estimate: Estimate) -> str:

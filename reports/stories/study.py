@@ -1,6 +1,7 @@
 """A study as `section.json` keeps it: what was found, with all digits, and no sentence."""
 
 from abc import abstractmethod
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict
@@ -26,3 +27,9 @@ class Study(BaseModel):
     @abstractmethod
     def document(self) -> Document:
         """The page, which is also a section of a report and the output on a terminal."""
+
+
+def with_all_columns(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Rows of several kinds, each with the columns of all."""
+    columns = dict.fromkeys(name for row in rows for name in row)
+    return [{name: row.get(name) for name in columns} for row in rows]

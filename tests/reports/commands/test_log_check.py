@@ -14,6 +14,7 @@ from support.tosses import BRICK, made
 from dropspin.comparisons.logs.log import Finding, load_log
 from dropspin.comparisons.logs.replay import flights_in
 from dropspin.reports.stories.log_check import CheckedLog
+from dropspin.reports.study_files import read_study
 from dropspin.scenarios import load
 
 
@@ -31,6 +32,15 @@ def recording(tmp_path):
     for name, keys in {"toss": {}, "short": {"length_scale": 1.02}}.items():
         (tmp_path / f"{name}.toml").write_text(tomlkit.dumps({"data": "toss.npz", "length_unit": "mm", **keys, "body": BRICK}))
     return tmp_path
+
+
+@pytest.fixture(scope="module")
+def cube(tmp_path_factory):
+    """The folder in which the shipped tosses were checked, and what was printed."""
+    folder = tmp_path_factory.mktemp("cube")
+    done = dropspin("log", "check", "toss-cube", "-o", "out", cwd=folder)
+    assert done.returncode == 1
+    return folder, done.stdout
 
 
 def test_sound_recording_has_values_and_no_finding(recording):
@@ -61,26 +71,45 @@ def test_finding_is_printed_with_alternatives_and_remedy_and_is_exit_code_1(reco
     assert [row["kind"] for row in data if row["row"] == "findings"] == ["scale"]
 
 
-def test_scene_of_each_toss_continues_it(tmp_path):
-    assert dropspin("log", "check", "toss-cube", "-o", "out", cwd=tmp_path).returncode == 1
-    files = sorted((tmp_path / "out" / "scenes").glob("*.toml"))
+def test_scene_of_each_toss_continues_it(cube):
+    folder, _ = cube
+    files = sorted((folder / "out" / "scenes").glob("*.toml"))
     assert len(files) == 100
     flights = flights_in("toss-cube")
     [start] = [start for start in flights.starts() if start.toss.name == "4"]
-    scene = load(tmp_path / "out" / "scenes" / "toss-4.toml")
+    scene = load(folder / "out" / "scenes" / "toss-4.toml")
     np.testing.assert_allclose(scene.initial_state, start.state, rtol=0.0, atol=1e-15)
     assert scene.duration == pytest.approx(start.toss.t[-1] - start.toss.t[start.frame])
     assert scene.floor == flights.log.header.floor
-    header = load_log(tmp_path / "out" / "corrected.toml").header
-    assert (header.length_scale, header.body.center_of_mass) == (0.978, (-0.0002, 0.0009, 0.0061))
 
 
-def test_page_shows_what_is_printed_of_the_shipped_tosses(tmp_path):
+def test_corrected_header_has_the_remedies_and_loads(cube):
+    folder, _ = cube
+    log = load_log(folder / "out" / "corrected.toml")
+    assert (log.header.length_scale, log.header.body.center_of_mass) == (0.978, (-0.0002, 0.0009, 0.0061))
+    assert len(log.tosses) == 100
+
+
+def test_page_shows_what_is_printed_of_the_shipped_tosses(cube):
     """Line by line, up to the places at which lines are broken."""
     page = (Path(__file__).parents[3] / "docs" / "measured.md").read_text(encoding="utf-8")
     [shown] = re.findall(r"^```text\n(toss-cube: .*?)^```$", page, re.DOTALL | re.MULTILINE)
-    printed = " ".join(dropspin("log", "check", "toss-cube", cwd=tmp_path).stdout.split())
+    printed = " ".join(cube[1].split())
     assert [part for part in shown.split("…\n") if " ".join(part.split()) not in printed] == []
+
+
+def test_fit_and_comparison_write_pages_and_name_what_to_correct(recording):
+    """With lengths that a header calls 2 % long, which they are not, gravity is too small."""
+    header = tomlkit.parse((recording / "short.toml").read_text()) | {"floor": {"restitution": 0.3, "friction": 0.3}}
+    (recording / "short.toml").write_text(tomlkit.dumps(header))
+    for command, rows in (("fit", {"estimates"}), ("compare", {"errors", "groups", "parts"})):
+        done = dropspin("log", command, "short.toml", "-e", "wang[contact=sequential,law=coulomb]", "-o", command, cwd=recording)
+        assert done.returncode == 0, done.stderr
+        assert "lengths are" in done.stdout
+        assert "Correct the header first: dropspin log check short.toml writes corrected.toml" in done.stdout
+        assert {row["row"] for row in json.loads((recording / command / f"log_{command}.json").read_text())} == rows
+        assert "Correct the header first" in (recording / command / "report.html").read_text()
+        assert read_study(str(recording / command)).title.endswith("short.toml")
 
 
 def test_many_findings_of_one_kind_are_shortened_on_a_terminal_alone():

@@ -1,8 +1,9 @@
 """What is said of friction and restitution: bounds where there are bounds, and whose property a disagreement is."""
 
 from dropspin.comparisons.logs.fit import Disagreement, Estimate, LogFit
-from dropspin.reports.document import Sentences, Table
-from dropspin.reports.stories.log_fit import document, interval
+from dropspin.comparisons.logs.log import Cause, Finding
+from dropspin.reports.document import Charts, Sentences, Table
+from dropspin.reports.stories.log_fit import FittedLog, interval
 
 
 def estimate(parameter, has_lower, has_upper):
@@ -18,7 +19,12 @@ def test_disagreement_on_restitution_is_a_setting_and_unidentified_friction_is_e
     disagreement = Disagreement("restitution", "mujoco", "wang", -0.158, -0.195, -0.133)
     estimates = (estimate("friction", False, False), estimate("restitution", True, True))
     fit = LogFit(100, 8, estimates, (disagreement,), {"mujoco": 0.00224}, {"broken": "out of order"})
-    table, sentences = document(fit).parts
+    scale = Finding("scale", 9.6, 9.81, causes=(Cause("length scale", -0.022, {"length_scale": 0.978}),))
+    study = FittedLog(recording="r.toml", findings=[scale, Finding("drag", 0.06, 0.0)], fit=fit)
+    document = FittedLog.model_validate_json(study.model_dump_json()).document()
+    table, charts, sentences = document.parts
+    assert isinstance(charts, Charts)
+    assert [(chart.x_label, chart.rows) for chart in charts.charts] == [("friction", ("mujoco",)), ("restitution", ("mujoco",))]
     assert isinstance(table, Table)
     assert table.rows == [
         {"engine": "mujoco", "friction": "not identified", "restitution": "0.300 (0.200 to 0.400)", "discrepancy": "2.24 mm"}
@@ -29,3 +35,7 @@ def test_disagreement_on_restitution_is_a_setting_and_unidentified_friction_is_e
     assert "mujoco needs 0.158 less than wang" in text
     assert "Friction is not identified with mujoco: no toss slides" in text
     assert "broken, out of order" in text
+    [correct] = document.summary
+    assert isinstance(correct, Sentences)
+    assert correct.items[0].endswith("Remedy: length_scale = 0.978.")
+    assert correct.items[1:] == ["Correct the header first: dropspin log check r.toml writes corrected.toml, with these remedies."]

@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 from dropspin.comparisons.regressions.comparing import History
 from dropspin.comparisons.results.folder import SECTION, file_name, read_stored
 from dropspin.reports.document import Charts, Document
+from dropspin.reports.html.study import study_page
 from dropspin.reports.markdown import markdown
 from dropspin.reports.output import write_table
 from dropspin.reports.plots.chart import figure_of, save_figure
@@ -28,12 +29,15 @@ def write_study(study: Study, folder: Path) -> Document:
     return document
 
 
-def write_parquet(study: Study, folder: Path) -> None:
-    """Write the rows of a study as Parquet."""
+def write_study_and_page(study: Study, folder: Path) -> Document:
+    """Write the files of a study, its rows as Parquet too, and `report.html`; and return its page."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    document = write_study(study, folder)
     pq.write_table(pa.Table.from_pylist(study.rows()), folder / f"{study.study}.parquet")
+    (folder / "report.html").write_text(study_page(document), encoding="utf-8")
+    return document
 
 
 def write_scenes(scenes: Iterable[Scenario], folder: Path) -> None:

@@ -15,14 +15,12 @@ import numpy as np
 
 from dropspin.comparisons.logs.flight import (
     ACCELERATION,
-    DRAG,
     FEWEST_FRAMES,
     OFFSET,
     accelerations,
     is_near,
     positions,
     window_size,
-    without,
 )
 from dropspin.comparisons.logs.flights import Flights, flights_of
 from dropspin.comparisons.logs.log import LENGTHS, TIMES, UPRIGHT, Cause, Finding, Header, Log, load_log
@@ -245,8 +243,7 @@ def _of_inertia(flights: Flights, drag: Regression) -> Iterator[Finding]:
 
 
 def _drag(flights: Flights) -> Regression:
-    samples = [without(positions(flight), flights.moving.values, ACCELERATION, OFFSET, DRAG) for flight in flights.found]
-    return regression(samples)
+    return regression([positions(flight, with_drag=True) for flight in flights.found])
 
 
 def _values(flights: Flights, drag: Regression) -> Iterator[Value]:

@@ -70,28 +70,32 @@ class Flight:
         return Flight(turned, len(toss.t) - self.end, len(toss.t) - self.first)
 
 
-def positions(flight: Flight) -> Samples:
-    """The tracked point as samples: own parameters x₀, v₀; shared ones the acceleration [m/s²], d [m] and the decay rate of v [1/s]."""
+def positions(flight: Flight, *, with_drag: bool = False) -> Samples:
+    """The tracked point as samples: own parameters x₀, v₀; shared ones the acceleration [m/s²], d [m], and the decay rate of v [1/s]."""
     t, eye = flight.t[:, np.newaxis, np.newaxis], np.eye(3)
     position, orientation = flight.toss.position[flight.rows], flight.toss.orientation[flight.rows]
-    matrices = np.stack([rotate(orientation, axis) for axis in eye], axis=2)
-    parabola = np.polynomial.polynomial.polyfit(flight.t, position, 2)
-    slowed = -(parabola[1] * t[:, 0] ** 2 / 2.0 + parabola[2] * t[:, 0] ** 3 / 3.0)
-    own = np.concatenate([np.broadcast_to(eye, (len(t), 3, 3)), t * eye], axis=2)
-    shared = np.concatenate([t**2 / 2.0 * eye, matrices, slowed[..., np.newaxis]], axis=2)
-    return Samples(flight.t, position, own, shared)
+    shared = [t**2 / 2.0 * eye, np.stack([rotate(orientation, axis) for axis in eye], axis=2)]
+    if with_drag:
+        parabola = np.polynomial.polynomial.polyfit(flight.t, position, 2)
+        slowed = -(parabola[1] * t[:, 0] ** 2 / 2.0 + parabola[2] * t[:, 0] ** 3 / 3.0)
+        shared.append(slowed[..., np.newaxis])
+    return Samples(flight.t, position, _lines(t), np.concatenate(shared, axis=2))
 
 
-ACCELERATION, OFFSET, DRAG = slice(0, 3), slice(3, 6), slice(6, 7)
+ACCELERATION, OFFSET = slice(0, 3), slice(3, 6)
 """The shared parameters of `positions`."""
 
 
-def without(samples: Samples, known: Array, *parts: slice) -> Samples:
-    """The samples with some shared parameters known, shape (7,), and only `parts` of them to be found."""
-    wanted = [index for part in parts for index in range(part.start, part.stop)]
-    fixed = [index for index in range(samples.shared.shape[2]) if index not in wanted]
-    values = samples.values - samples.shared[..., fixed] @ known[fixed]
-    return Samples(samples.t, values, samples.own, samples.shared[..., wanted])
+def departures(flight: Flight, known: Array) -> Samples:
+    """The tracked point less the motion by known shared parameters, shape (6,), as samples with own parameters alone."""
+    t, rows = flight.t[:, np.newaxis, np.newaxis], flight.rows
+    motion = t[:, 0] ** 2 / 2.0 * known[ACCELERATION] + rotate(flight.toss.orientation[rows], known[OFFSET])
+    return Samples(flight.t, flight.toss.position[rows] - motion, _lines(t), np.empty((len(t), 3, 0)))
+
+
+def _lines(t: Array) -> Array:
+    """Derivatives by x₀ and v₀, shape (n, 3, 6), at times of shape (n, 1, 1)."""
+    return np.concatenate([np.broadcast_to(np.eye(3), (len(t), 3, 3)), t * np.eye(3)], axis=2)
 
 
 def falls(log: Log, acceleration: Array) -> list[Flight | None]:
@@ -163,7 +167,7 @@ def surprise(flight: Flight, frame: int, shared: Array, noise: Noise, delay: flo
     times = np.append(toss.t[recent.first : recent.end], toss.t[frame] + delay)
     rows = np.append(np.arange(recent.first, recent.end), frame)
     together = replace(toss, t=times, position=toss.position[rows], orientation=toss.orientation[rows])
-    samples = without(positions(Flight(together, 0, len(rows))), shared)
+    samples = departures(Flight(together, 0, len(rows)), shared)
     covariance = noise.covariance(samples.t)
     line = np.stack([np.ones(len(rows)), samples.t], axis=1)
     before = np.linalg.solve(covariance[:-1, :-1], np.column_stack([line[:-1], samples.values[:-1], covariance[:-1, -1]]))

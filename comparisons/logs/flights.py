@@ -1,11 +1,11 @@
 """All flights of a recording: what they share, and the state at the end of each."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, Flight, falls, grown, positions, without
+from dropspin.comparisons.logs.flight import ACCELERATION, Flight, departures, falls, grown, positions
 from dropspin.comparisons.logs.log import Log, Toss
 from dropspin.comparisons.logs.noise import Noise, Regression, end_of, regression
 from dropspin.comparisons.logs.rotors import Rotation, rotation, turn_by
@@ -71,7 +71,7 @@ class Flights:
     def starts(self) -> list[Start]:
         """The state at the end of each flight, by the header's gravity and centre of mass."""
         header = self.log.header
-        known = np.concatenate([[0.0, -header.gravity, 0.0], np.asarray(header.tracked_point) - header.body.centre, [0.0]])
+        known = np.concatenate([[0.0, -header.gravity, 0.0], np.asarray(header.tracked_point) - header.body.centre])
         each = zip(self.found, self.rotations, self.moving.weights, self.turning.weights, strict=True)
         position, orientation = self.moving.noise, self.turning.noise
         return [
@@ -81,7 +81,7 @@ class Flights:
 
 def _start(flight: Flight, known: Array, rotor: Rotation, position_noise: Noise, orientation_noise: Noise) -> Start:
     end = np.array([flight.duration])
-    samples = without(positions(flight), known)
+    samples = departures(flight, known)
     moved, moved_covariance = end_of(samples, np.concatenate([np.zeros((3, 3)), np.eye(3)], axis=1), position_noise)
     moved[:3] += 0.5 * known[ACCELERATION] * end**2
     moved[3:] += known[ACCELERATION] * end
@@ -111,7 +111,5 @@ def flights_of(log: Log, acceleration: Array) -> Flights | None:
 
 
 def shared_motion(flights: Sequence[Flight]) -> Regression:
-    """Acceleration and d of flights, shape (7,) with a drag of 0."""
-    known = np.zeros(7)
-    found = regression([without(positions(flight), known, ACCELERATION, OFFSET) for flight in flights])
-    return replace(found, values=np.append(found.values, 0.0))
+    """Acceleration and d of flights, shape (6,)."""
+    return regression([positions(flight) for flight in flights])

@@ -31,8 +31,8 @@ def diagnose_command(file: str, output: str, json_output: bool, **options: Any) 
     """
     from dropspin.comparisons.diagnosis.study import diagnose
     from dropspin.comparisons.results.folder import study_folder
-    from dropspin.reports.html.study import write_study_and_page
     from dropspin.reports.stories.diagnose import Diagnosed
+    from dropspin.reports.study_files import write_study_and_page
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.reports.terminal.rows import print_json_or
 

@@ -24,9 +24,8 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
     from dropspin.comparisons.logs.check import log_check
     from dropspin.comparisons.logs.replay import scenes_of
     from dropspin.comparisons.results.folder import study_folder
-    from dropspin.reports.html.study import write_study_and_page
     from dropspin.reports.stories.log_check import CheckedLog
-    from dropspin.reports.study_files import write_scenes, write_toml
+    from dropspin.reports.study_files import write_scenes, write_study_and_page, write_toml
     from dropspin.reports.terminal.rows import print_json_or
 
     with study_folder(output) as folder:

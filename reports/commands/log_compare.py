@@ -28,8 +28,8 @@ def log_compare_command(recording: str, fits: bool, output: str, json_output: bo
     from dropspin.comparisons.logs.fit import log_fit
     from dropspin.comparisons.logs.replay import flights_in
     from dropspin.comparisons.results.folder import study_folder
-    from dropspin.reports.html.study import write_study_and_page
     from dropspin.reports.stories.log_compare import ComparedLog
+    from dropspin.reports.study_files import write_study_and_page
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.reports.terminal.rows import print_json_or
 

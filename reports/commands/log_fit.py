@@ -26,8 +26,8 @@ def log_fit_command(recording: str, output: str, json_output: bool, **options: A
     from dropspin.comparisons.logs.fit import log_fit
     from dropspin.comparisons.logs.replay import flights_in
     from dropspin.comparisons.results.folder import study_folder
-    from dropspin.reports.html.study import write_study_and_page
     from dropspin.reports.stories.log_fit import FittedLog
+    from dropspin.reports.study_files import write_study_and_page
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.reports.terminal.rows import print_json_or
 

@@ -11,7 +11,7 @@ from dropspin.comparisons.logs.check import Check, TossFacts, Value
 from dropspin.comparisons.logs.log import Finding
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
-from dropspin.reports.stories.log_findings import sentence, texts
+from dropspin.reports.stories.log_findings import remedy, sentence
 from dropspin.reports.stories.numbers import formatted, grouped
 from dropspin.reports.stories.study import Study, with_all_columns
 from dropspin.scenarios.text import counted
@@ -45,7 +45,9 @@ class CheckedLog(Study):
     def rows(self) -> list[dict[str, Any]]:
         """Every value, every finding and every toss, each with the columns of all."""
         rows = [{"row": "values", **asdict(value), "note": self._note(value)} for value in self.values]
-        rows += [{"row": "findings", **asdict(finding), **texts(finding)} for finding in self.findings]
+        for finding in self.findings:
+            words = {"causes": [cause.name for cause in finding.causes], "remedy": remedy(finding), "sentence": sentence(finding)}
+            rows.append({"row": "findings", **asdict(finding), **words})
         rows += [{"row": "tosses", **asdict(toss)} for toss in self.tosses]
         return with_all_columns(rows)
 

@@ -79,36 +79,41 @@ SEPARATED_BY = {
 
 def sentence(finding: Finding) -> str:
     """What was found, its causes, what shows or separates them, and the remedy."""
-    parts, several = texts(finding), len(finding.causes) > 1
-    causes = f": {'either ' if several else ''}{', or '.join(parts['causes'])}" if parts["causes"] else ""
-    shown = f" {'Separated' if several else 'Shown'} by: {parts['shown']}." if parts["shown"] else ""
-    remedy = f" Remedy: {parts['remedy']}." if parts["remedy"] else ""
-    return capitalized(f"{parts['what']}{causes}.{shown}{remedy}")
+    given, several = _given(finding), len(finding.causes) > 1
+    is_shown = math.isfinite(finding.value if finding.kind == "quaternion" else finding.rests)
+    by = SEPARATED_BY if several else SHOWN_BY if is_shown else {}
+    parts = {
+        ": either " if several else ": ": ", or ".join(filter(None, map(_words, finding.causes))),
+        ". Separated by: " if several else ". Shown by: ": by.get(finding.kind, "").format_map(given),
+        ". Remedy: ": remedy(finding),
+    }
+    found = "".join(name + text for name, text in parts.items() if text)
+    return capitalized(f"{KINDS[finding.kind].format_map(given)}{found}.")
+
+
+def remedy(finding: Finding) -> str:
+    """What removes a finding, for each of its causes; empty if it needs no remedy."""
+    given = _given(finding)
+    remedies = [_remedy(cause, given) for cause in finding.causes] or [REMEDIES.get(finding.kind, "")]
+    return ", or ".join(filter(None, remedies))
+
+
+def _given(finding: Finding) -> dict[str, Any]:
+    """The columns of a finding, with its numbers in other units."""
+    value, expected = finding.value, finding.expected
+    numbers = {"mm": 1e3 * value, "ms": 1e3 * value, "expected_ms": 1e3 * expected, "rests_mm": 1e3 * finding.rests}
+    numbers |= {"degrees": math.degrees(value), "percent": 100.0 * value, "expected_percent": 100.0 * expected}
+    return vars(finding) | numbers
 
 
 def corrections(recording: str, findings: Iterable[Finding]) -> list[str]:
     """What to correct in the header before engines are compared with a recording."""
     found = [sentence(finding) for finding in findings if any(cause.keys for cause in finding.causes)]
     if found:
-        found.append(f"Correct the header first: dropspin log check {recording} writes corrected.toml, with these remedies.")
+        found.append(
+            f"Correct the header first: dropspin log check {recording} writes corrected.toml, with each remedy that has no alternative."
+        )
     return found
-
-
-def texts(finding: Finding) -> dict[str, Any]:
-    """The parts of the sentence on a finding."""
-    value, expected, several = finding.value, finding.expected, len(finding.causes) > 1
-    numbers = {"mm": 1e3 * value, "ms": 1e3 * value, "expected_ms": 1e3 * expected, "rests_mm": 1e3 * finding.rests}
-    numbers |= {"degrees": math.degrees(value), "percent": 100.0 * value, "expected_percent": 100.0 * expected}
-    is_shown = math.isfinite(value if finding.kind == "quaternion" else finding.rests)
-    by = SEPARATED_BY if several else SHOWN_BY if is_shown else {}
-    given = vars(finding) | numbers
-    remedies = [_remedy(cause, given) for cause in finding.causes] or [REMEDIES.get(finding.kind, "")]
-    return {
-        "what": KINDS[finding.kind].format_map(given),
-        "causes": [text for text in map(_words, finding.causes) if text],
-        "shown": by.get(finding.kind, "").format_map(given),
-        "remedy": ", or ".join(filter(None, remedies)),
-    }
 
 
 def _words(cause: Cause) -> str:

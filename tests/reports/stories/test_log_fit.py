@@ -38,4 +38,5 @@ def test_disagreement_on_restitution_is_a_setting_and_unidentified_friction_is_e
     [correct] = document.summary
     assert isinstance(correct, Sentences)
     assert correct.items[0].endswith("Remedy: length_scale = 0.978.")
-    assert correct.items[1:] == ["Correct the header first: dropspin log check r.toml writes corrected.toml, with these remedies."]
+    remedies = "writes corrected.toml, with each remedy that has no alternative."
+    assert correct.items[1:] == [f"Correct the header first: dropspin log check r.toml {remedies}"]

@@ -44,7 +44,7 @@ faults: $(VENV)/.installed-dev        ## engines with one planted fault each aga
 
 coverage: $(VENV)/.installed-dev      ## how often intervals are right: docs/coverage.md, and the table in docs/measured.md
 	PYTHONPATH=tests $(BIN)/python -m support.interval_coverage
-	PYTHONPATH=tests $(BIN)/python -m support.log_coverage
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m support.log_coverage
 
 bench: $(VENV)/.installed             ## speed beside the engines, as ratios: out/bench.json, out/bench.svg
 	$(BIN)/python benchmarks/speed.py

@@ -16,6 +16,7 @@ import uuid
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -174,7 +175,7 @@ class Runs:
         """
         __tracebackhide__ = True
         fails = FAILING | {"missing"} if self.named else FAILING
-        judged = [_described(row) | {"fails": row["verdict"] in fails} for row in rows]
+        judged = [row | {"message": _message(row), "fails": row["verdict"] in fails} for row in rows]
         node.stash.setdefault(JUDGED, []).extend(row for row in judged if row["fails"] or row["verdict"] in STOPPED | {"passed", "known"})
         failing = [row for row in judged if row["fails"]]
         if failing:
@@ -186,13 +187,10 @@ class Runs:
 
     def _failure(self, result: Result, failing: Sequence[Row]) -> str:
         """The failures, with the commands that reproduce and accept them."""
-        orders = {(row["scene"], row["engine"], row["metric"]): row["value"] for row in result.rows if row["kind"] == "order"}
         lines = []
         for row in failing[:MOST_FAILURES]:
-            order = orders.get((row["scene"], row["engine"], row["metric"]))
-            observed = "" if order is None or row["kind"] == "order" else f" (observed order {order:.2f})"
             reason = [f"    {row['reason']}"] if row["metric"] and row["reason"] else []
-            lines += [f"{row['scene']}, {row['engine']}: {row['message']}{observed}", *reason]
+            lines += [f"{row['scene']}, {row['engine']}: {row['message']}", *reason]
         if len(failing) > MOST_FAILURES:
             lines.append(f"and {len(failing) - MOST_FAILURES} more")
         lines.append(f"Reproduce: {self._reproduce(result, failing)}")
@@ -241,33 +239,24 @@ def _written(folder: Path, scene: Mapping[str, Any]) -> Path:
     return path
 
 
-def _described(row: Row) -> Row:
-    """A row with its `message`, one line, and its `share`: the value relative to its bound, above 1 if it fails, 0 without a bound."""
-    value, lower, upper = row["value"], row["lower"], row["upper"]
-    # The bound that the value exceeds, or to which it is nearest.
-    bound = upper if lower is None else lower if upper is None or value is None or value < 0.5 * (lower + upper) else upper
-    share = math.inf if value is None else 0.0
-    if bound and value is not None:
-        at_least = (bound == lower) == (bound > 0.0)  # or, for a negative bound, at most: values nearer to 0 are not allowed
-        share = bound / value if at_least and value else value / bound
-    return row | {"message": _message(row, bound), "share": share}
-
-
-def _message(row: Row, bound: float | None) -> str:
-    """A row in one line: its subject, its value, its bound, and the ratio of the two."""
+def _message(row: Row) -> str:
+    """A row in one line: its subject, its value and its bounds."""
     if not row["metric"]:
         return f"{row['verdict']}: {row['reason']}"
     prefix = row["truth"] if row["kind"] == "baseline" else row["kind"] if row["kind"] in SUBJECTS else ""
     at = "" if row["dt"] is None else f" at {row['dt']:g} s"
-    subject = f"{SUBJECTS.get(prefix, prefix)} {row['metric']}{at}".strip()
-    value, lower, upper = row["value"], row["lower"], row["upper"]
     unit = "" if row["unit"] == "1" else f" {row['unit']}"
-    if value is None or bound is None:
-        return f"{subject} is " + ("undefined" if value is None else f"{value:.3g}{unit}")
-    expected = f"≤ {upper:.3g}" if lower is None else f"≥ {lower:.3g}" if upper is None else f"{lower:.3g} … {upper:.3g}"
-    if lower is not None and upper == -lower:
-        expected = f"± {upper:.3g}"
-    return f"{subject} is {value:.3g}{unit}, expected {expected}" + (f": {value / bound:.3g} times its bound" if bound else "")
+    value = "undefined" if row["value"] is None else f"{row['value']:.3g}{unit}"
+    match row["lower"], row["upper"]:
+        case None, None:
+            expected = ""
+        case None, upper:
+            expected = f", expected ≤ {upper:.3g}"
+        case lower, None:
+            expected = f", expected ≥ {lower:.3g}"
+        case lower, upper:
+            expected = f", expected {lower:.3g} … {upper:.3g}"
+    return f"{SUBJECTS.get(prefix, prefix)} {row['metric']}{at} is {value}{expected}".strip()
 
 
 RUNS = pytest.StashKey[Runs]()
@@ -398,12 +387,11 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
             judged.setdefault((row["engine"], row["scene"]), {})[key] = row
     if not judged:
         return
-    lines = [("engine", "scene", "passed", "failed", "known", "worst")]
+    lines = [("engine", "scene", "passed", "failed", "known", "message")]
     for (engine, scene), found in judged.items():
         rows = found.values()
-        worst = max(rows, key=lambda row: (row["fails"], row["share"]))
         tally = (sum(row[key] == value for row in rows) for key, value in (("verdict", "passed"), ("fails", True), ("verdict", "known")))
-        lines.append((engine, scene, *map(str, tally), worst["message"]))
+        lines.append((engine, scene, *map(str, tally), max(rows, key=itemgetter("fails"))["message"]))
     widths = [max(map(len, column)) for column in list(zip(*lines, strict=True))[:-1]]
     terminalreporter.section(NAME)
     for *cells, message in lines:

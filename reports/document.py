@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from dropspin.reports.plots.chart import Chart, Drawing
+    from dropspin.reports.plots.chart import Chart
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,23 +58,18 @@ class Sentences(Part):
 
 @dataclass(frozen=True)
 class Table(Part):
-    """Rows of texts by column. A terminal shows `lines` instead, if there are any.
-
-    A narrow terminal leaves out the columns in `left_out_first`, in this order.
-    """
+    """Rows of texts by column; a narrow terminal leaves out the columns in `left_out_first`, in this order."""
 
     rows: Sequence[Mapping[str, str]]
     left_out_first: Sequence[str] = ()
-    lines: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
 class Charts(Part):
-    """A picture of charts, or of what functions draw into axes, which a page in HTML does not show; a terminal shows neither."""
+    """A picture of charts; a terminal does not show it."""
 
     name: str
     charts: "Sequence[Chart]" = ()
-    drawings: "Sequence[Drawing]" = ()
 
 
 @dataclass(frozen=True)

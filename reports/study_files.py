@@ -68,7 +68,7 @@ def write_page(document: Document, folder: Path, stem: str) -> None:
     """Write a Markdown page and its pictures."""
     for part in document.parts:
         if isinstance(part, Charts):
-            save_figure(figure_of([*part.charts, *part.drawings]), folder / f"{file_name(part.name)}.svg")
+            save_figure(figure_of(part.charts), folder / f"{file_name(part.name)}.svg")
     (folder / f"{stem}.md").write_text(markdown(document), encoding="utf-8")
 
 

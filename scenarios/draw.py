@@ -47,15 +47,14 @@ import numpy as np
 from dropspin.scenarios.bodies.surface import depth_below_centre
 from dropspin.scenarios.draws import Draws
 from dropspin.scenarios.errors import DropspinError, SceneError
-from dropspin.scenarios.families import FAMILIES
+from dropspin.scenarios.families import FAMILIES, OF_PLAIN_SHAPES
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 from dropspin.scenarios.truths import Impact, truth_for
 
-MOST_SCENES = 1000  # of a kind
-OF_PLAIN_SHAPES = 10
-"""The families of balls, boxes and points, whose scenes have the numbers up to `MOST_SCENES`; those of the others come after it."""
+MOST_SCENES = 1000
+"""Scenes of balls, boxes and points have the numbers up to this; those of the other families come after it."""
 LARGEST_SEED = 2**64 - 1
 COARSEST_STEP = 4e-3  # s, of a run by default
 FLIGHT_STEPS, TURN = 16, 0.1  # fewest steps of a flight, and the largest turn in one [rad]
@@ -85,10 +84,11 @@ def draw(count: int, seed: int) -> list[Scenario]:
 
 def _number(place: int) -> int:
     """The number of the scene at a place in the sequence, in which all families follow each other."""
+    plain = len(OF_PLAIN_SHAPES)
     cycle, family = divmod(place, len(FAMILIES))
-    if family < OF_PLAIN_SHAPES:
-        return 1 + OF_PLAIN_SHAPES * cycle + family
-    return 1 + MOST_SCENES + (len(FAMILIES) - OF_PLAIN_SHAPES) * cycle + family - OF_PLAIN_SHAPES
+    if family < plain:
+        return 1 + plain * cycle + family
+    return 1 + MOST_SCENES + (len(FAMILIES) - plain) * cycle + family - plain
 
 
 def drawn_scene(seed: int, number: int) -> Scenario:
@@ -100,10 +100,9 @@ def drawn_scene(seed: int, number: int) -> Scenario:
     name = f"draw-{seed}-{number:03d}"
     if not (1 <= number <= 2 * MOST_SCENES and seed <= LARGEST_SEED):
         raise SceneError(f"scene {name!r}: scenes are drawn with seeds up to {LARGEST_SEED} and numbers from 1 to {2 * MOST_SCENES}.")
-    families = list(FAMILIES)
-    families = families[:OF_PLAIN_SHAPES] if number <= MOST_SCENES else families[OF_PLAIN_SHAPES:]
-    family = families[(number - 1) % len(families)]
-    summary, draw_content = FAMILIES[family]
+    families = OF_PLAIN_SHAPES if number <= MOST_SCENES else FAMILIES[len(OF_PLAIN_SHAPES) :]
+    draw_content = families[(number - 1) % len(families)]
+    family, summary = draw_content.__name__.replace("_", "-"), (draw_content.__doc__ or "").removesuffix(".")
     draws = Draws(np.random.default_rng([seed, number]))
     for _ in range(MOST_DRAWS):
         content, last_impact = draw_content(draws)

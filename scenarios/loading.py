@@ -1,6 +1,5 @@
 """Loading of a `Scenario` by the name or number of a catalogue scene, the name of a random scene, from a TOML file, or from a mapping."""
 
-import json
 import os
 import re
 import sys
@@ -11,15 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from dropspin.scenarios.bodies.mesh_files import read_mesh
-from dropspin.scenarios.damping import Damping
 from dropspin.scenarios.errors import DropspinError, SceneError, SceneWarning, did_you_mean
 from dropspin.scenarios.files import read_file
-from dropspin.scenarios.model import Ensemble, Expectation, Gravity, Scenario, Start
+from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.problems import scene_name
-from dropspin.scenarios.surfaces import Floor, Wall
 from dropspin.scenarios.tables import LARGEST
 from dropspin.scenarios.validation import Alternatives, first_problem, shown
 
@@ -30,20 +27,9 @@ MAX_FILE_SIZE = 1_000_000  # bytes; a scene of ten thousand vertices is smaller
 ALONG_FLOOR = 1e-6  # of gravity, across a floor to which it is parallel
 DEEPEST = 30
 """Largest depth of nested tables and lists in a file; a baseline has six."""
-FEATURES: dict[str, type[BaseModel]] = {
-    "floor": Floor,
-    "wall": Wall,
-    "gravity": Gravity,
-    "start": Start,
-    "damping": Damping,
-    "ensemble": Ensemble,
-    "expect": Expectation,
-}
 ALTERNATIVES: Alternatives = {
-    ("floor.friction", "literal_error"): ", or a Coulomb coefficient of 0 or more",
-    ("floor.friction", "*"): ", or be 'none' or 'infinite'",
-    ("wall.friction", "literal_error"): ", or a Coulomb coefficient of 0 or more",
-    ("wall.friction", "*"): ", or be 'none' or 'infinite'",
+    **{(f"{surface}.friction", "literal_error"): ", or a Coulomb coefficient of 0 or more" for surface in ("floor", "wall")},
+    **{(f"{surface}.friction", "*"): ", or be 'none' or 'infinite'" for surface in ("floor", "wall")},
     ("body.inertia", "*"): ", or three positive moments [Ixx, Iyy, Izz], or a tensor of three such rows",
 }
 
@@ -169,27 +155,13 @@ def read_toml(path: Path, given: str, what: str = "scene", largest: int = MAX_FI
         reason = "is a binary file, which is not UTF-8 text" if b"\0" in raw else f"byte {error.start} is not UTF-8 text"
         raise SceneError(f"{given}: {reason}; {remedy}.") from None
     except tomllib.TOMLDecodeError as error:
-        if found := _format(text):
-            raise SceneError(f"{given}: is {found}; {remedy}.") from None
-        raise SceneError(f"{given}: not TOML: {error}{'' if path.suffix == '.toml' else f'; {remedy}'}.") from None
+        raise SceneError(f"{given}: not TOML: {error}; {remedy}.") from None
     except RecursionError:
         raise SceneError(f"{given}: nested too deeply to be a {what}.") from None
     except ValueError:  # of Python's limit for converting decimal digits
         raise SceneError(f"{given}: has a whole number {TOO_LARGE}.") from None
     _verify_sizes(content, given, what)
     return content
-
-
-def _format(text: str) -> str:
-    """What a text that is not TOML is, such as a robot's model; empty if that is not recognised."""
-    if element := re.match(r"(?:\s|<\?.*?\?>|<!--.*?-->|<![^->]*>)*+<([A-Za-z]+)", text, re.DOTALL):
-        model = {"mujoco": "an MJCF model", "robot": "a URDF model", "sdf": "an SDF model"}
-        return f"{model.get(element[1], 'a file')} in XML"
-    try:
-        json.loads(text)
-    except (ValueError, RecursionError):
-        return ""
-    return "a file in JSON"
 
 
 TOO_LARGE = "that exceeds the range of floating-point numbers"

@@ -14,6 +14,12 @@ def cross(a: Array, b: Array) -> Array:
     return product
 
 
+def crossing(a: Array) -> Array:
+    """The matrix of a ×, shape (3, 3), of one vector."""
+    x, y, z = a.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
 def dot(a: Array, b: Array) -> Array:
     """A · b over the last axis; np.sum over so short an axis takes three times as long."""
     return np.einsum("...i,...i->...", a, b)

@@ -1,6 +1,5 @@
 """Trajectories: the states of a body over time."""
 
-import html
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
@@ -12,10 +11,6 @@ from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, STATE_COLUMNS,
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-def _shown(values: Array) -> str:
-    return ", ".join(f"{value:.3g}" for value in values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,16 +65,6 @@ class Trajectory:
         if len(self) == 0:
             return "<Trajectory: no states>"
         return f"<Trajectory: {len(self)} states from t = {self.t[0]:.3g} s to {self.t[-1]:.3g} s>"
-
-    def _repr_html_(self) -> str:
-        """The first and the last state as HTML, for notebooks."""
-        named = {"position": "m", "orientation": "x, y, z, w", "velocity": "m/s", "angular_velocity": "rad/s"}
-        header = "".join(f"<th>{name.replace('_', ' ')} [{unit}]</th>" for name, unit in named.items())
-        ends = [
-            f"<tr><th>t = {end.t[0]:.3g} s</th>" + "".join(f"<td>{_shown(getattr(end, name)[0])}</td>" for name in named) + "</tr>"
-            for end in ([self[:1], self[-1:]] if len(self) else [])
-        ]
-        return f"<p>{html.escape(repr(self)[1:-1])}</p><table><tr><th></th>{header}</tr>{''.join(ends)}</table>"
 
     def __len__(self) -> int:
         return len(self.t)

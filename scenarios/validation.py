@@ -7,7 +7,7 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from dropspin.scenarios.errors import DropspinError, did_you_mean, nearest
+from dropspin.scenarios.errors import DropspinError, did_you_mean
 from dropspin.scenarios.tables import LARGEST
 
 Kind = TypeVar("Kind", bound=BaseModel)
@@ -39,7 +39,7 @@ def validated(kind: type[Kind], where: str, content: Any) -> Kind:
 
 
 def first_problem(kind: type[BaseModel], error: ValidationError, alternatives: Alternatives | None = None, root: str = "") -> str:
-    """The first problem of a table as 'key: got value; what is allowed.', and how many other keys have problems.
+    """The first problem of a table as 'key: got value; what is allowed.'.
 
     Args:
         kind: The model.
@@ -53,11 +53,7 @@ def first_problem(kind: type[BaseModel], error: ValidationError, alternatives: A
     relevant = [problem for problem in problems if problem["type"] != "literal_error" or isinstance(problem["input"], str)]
     # An unknown key comes first: if it is misspelt, the key that is meant is missing, which is the same problem.
     unknown = [problem for problem in problems if problem["type"] == "extra_forbidden"]
-    meant = [_meant(kind, problem, root) for problem in unknown]
-    places = [_located(kind, problem)[0] for problem in problems if problem["type"] != "missing" or _located(kind, problem)[0] not in meant]
-    others = len({tuple(place[:2]) for place in places}) - 1
-    more = f" (and {others} more {'problem' if others == 1 else 'problems'})" if others else ""
-    return f"{_described(kind, (unknown or relevant or problems)[0], alternatives or {}, root)}{more}"
+    return _described(kind, (unknown or relevant or problems)[0], alternatives or {}, root)
 
 
 def shown(value: Any) -> str:
@@ -120,12 +116,6 @@ def _items(count: int) -> str:
 def _keys(table: type[BaseModel], root: str) -> list[str]:
     """The keys that a table may have."""
     return [field.alias or name for name, field in table.model_fields.items() if not _is_hidden(field, root)]
-
-
-def _meant(kind: type[BaseModel], unknown: Problem, root: str) -> list[str | int | None]:
-    """The place of the key that is probably meant by an unknown one."""
-    path, table = _located(kind, unknown)
-    return [*path[:-1], nearest(str(path[-1]), _keys(table, root))]
 
 
 def _is_hidden(field: Any, root: str) -> bool:

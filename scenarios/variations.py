@@ -13,23 +13,25 @@ import numpy as np
 
 from dropspin.scenarios.bodies.shape import times
 from dropspin.scenarios.errors import DropspinError, did_you_mean
-from dropspin.scenarios.loading import FEATURES, from_mapping, from_table
+from dropspin.scenarios.loading import from_mapping, from_table
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, turned_states
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 from dropspin.scenarios.surfaces import Surface, Wall
 from dropspin.scenarios.validation import key_of
 
-TABLES = ("body", *(name for name in FEATURES if name != "expect"))
+TABLES = ("body", "floor", "wall", "gravity", "start", "damping", "ensemble")
 AWAY = np.array([0.8, 0.0, 0.6])
 """A horizontal direction that is no axis."""
 NEXT_AXES = np.array([0.5, 0.5, 0.5, 0.5])
 """The rotation that takes the x axis to the y axis, y to z, and z to x."""
+Tables = Mapping[str, Any] | Sequence[Any] | None
+"""New values of some keys of a table, or all walls."""
 REFLECTED = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
 """The signs of a state that is mirrored at the plane x = 0; rotations and angular velocities are axial."""
 
 
-def changed(scene: Scenario, duration: float | None = None, **tables: Mapping[str, Any] | Sequence[Any] | None) -> Scenario:
+def changed(scene: Scenario, duration: float | None = None, **tables: Tables) -> Scenario:
     """The scene with some keys of some tables, the walls, or its duration replaced, and without expectations and ensemble."""
     content = scene.model_dump(exclude={"expect", "ensemble"}, exclude_none=True)
     for table, keys in tables.items():
@@ -154,7 +156,7 @@ def with_inertia_ratio(scene: Scenario, ratio: float) -> Scenario:
 def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: float = 1.0) -> Scenario:
     """The scene in other units; the arguments are a metre, a second and a kilogram in these units."""
     start, speed = scene.start, length / time
-    tables: dict[str, Mapping[str, Any] | Sequence[Any] | None] = {
+    tables: dict[str, Tables] = {
         "wall": _walls(scene, lambda wall: {"point": times(length, wall.point), "rest_speed": speed * wall.rest_speed}),
         "body": scene.body.scaled(length, mass),
         "start": {
@@ -186,7 +188,7 @@ def with_other_numbers(scene: Scenario, share: float) -> Scenario:
         friction = surface.friction if isinstance(surface.friction, str) else share * surface.friction
         return {"restitution": surface.restitution / share, "friction": friction, "rest_speed": share * surface.rest_speed}
 
-    tables: dict[str, Mapping[str, Any] | Sequence[Any] | None] = {
+    tables: dict[str, Tables] = {
         "body": scene.body.scaled(1.0 / share, share),
         "wall": _walls(scene, other),
     }
@@ -206,31 +208,23 @@ def units_of_states(length: float = 1.0, time: float = 1.0) -> Array:
     return units
 
 
+def _seen(scene: Scenario, change: Callable[[tuple[float, ...]], tuple[float, ...]]) -> dict[str, Tables]:
+    """The walls and gravity with changed vectors."""
+    walls = _walls(scene, lambda wall: {"point": change(wall.point), "normal": change(wall.normal)})
+    gravity = {} if scene.gravity is None else {"gravity": {"acceleration": change(scene.gravity.acceleration)}}
+    return {"wall": walls, **gravity}
+
+
 def turned(scene: Scenario, rotation: Array) -> Scenario:
     """The scene, gravity and walls included, turned about the vertical by a rotation."""
-
-    def turn(vector: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple(map(float, rotate(rotation, np.array(vector))))
-
     found = scene.starting_at(turned_states(scene.initial_state, rotation))
-    if scene.wall is not None:
-        found = changed(found, wall=_walls(scene, lambda wall: {"point": turn(wall.point), "normal": turn(wall.normal)}))
-    if scene.gravity is None:
-        return found
-    return changed(found, gravity={"acceleration": turn(scene.gravity.acceleration)})
+    return changed(found, scene.duration, **_seen(scene, lambda vector: tuple(map(float, rotate(rotation, np.array(vector))))))
 
 
 def mirrored(scene: Scenario) -> Scenario:
     """The scene, body and gravity included, mirrored at the plane x = 0."""
-
-    def mirror(vector: tuple[float, ...]) -> tuple[float, ...]:
-        return (-vector[0], *vector[1:])
-
-    walls = _walls(scene, lambda wall: {"point": mirror(wall.point), "normal": mirror(wall.normal)})
-    tables: dict[str, Mapping[str, Any] | Sequence[Any] | None] = {"body": scene.body.mirrored(), "wall": walls}
-    if scene.gravity is not None:
-        tables["gravity"] = {"acceleration": mirror(scene.gravity.acceleration)}
-    return changed(scene.starting_at(REFLECTED * scene.initial_state), scene.duration, **tables)
+    found = scene.starting_at(REFLECTED * scene.initial_state)
+    return changed(found, scene.duration, body=scene.body.mirrored(), **_seen(scene, lambda vector: (-vector[0], *vector[1:])))
 
 
 def with_next_axes(scene: Scenario) -> Scenario:

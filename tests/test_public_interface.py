@@ -138,16 +138,6 @@ def test_repr_of_a_trajectory_is_one_line():
     assert repr(motion[:0]) == "<Trajectory: no states>"
 
 
-def test_notebook_shows_the_ends_of_a_trajectory():
-    motion = ds.truth_for(ds.load("fall-spin"))(np.linspace(0.0, 0.5, 6))
-    shown = table_of(motion._repr_html_())
-    assert list(shown.index) == ["t = 0 s", "t = 0.5 s"]
-    for place, row in zip((0, -1), shown.index, strict=True):
-        for column, values in (("position [m]", motion.position), ("angular velocity [rad/s]", motion.angular_velocity)):
-            np.testing.assert_allclose([float(part) for part in shown.loc[row, column].split(",")], values[place], rtol=5e-3)
-    assert "no states" in motion[:0]._repr_html_()
-
-
 @pytest.mark.parametrize(
     ("errors", "start"),
     [

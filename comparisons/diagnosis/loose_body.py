@@ -33,7 +33,7 @@ class Drag(NamedTuple):
     quadratic: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Facts:
     """What an engine has in force for a body; `in_force` and `lowest` compute with it.
 
@@ -79,14 +79,14 @@ class Facts:
     pose: Array
     resistance: Resistance
     falls: Drag
-    spins: tuple[Drag, Drag, Drag]
-    armature: float
-    lifted: float
-    unknown: Sequence[str]
+    spins: tuple[Drag, Drag, Drag] = (Drag(), Drag(), Drag())
+    armature: float = 0.0
+    lifted: float = 0.0
+    unknown: Sequence[str] = ()
     surface: str
-    others: Sequence[str]
+    others: Sequence[str] = ()
     friction: float
-    restitution: float | None
+    restitution: float | None = None
     margin: float
     rolling: bool
     rest_depth: float

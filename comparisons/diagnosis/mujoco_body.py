@@ -173,7 +173,6 @@ class MuJoCoBody(LooseBody):
             surface="" if surface is None else self._names[surface],
             others=[self._names[geom] for geom in alone.others],
             friction=0.0 if touching is None or touching["condim"] == 1 else float(touching["friction"][0]),
-            restitution=None,
             margin=0.0 if touching is None else float(touching["margin"] - touching["gap"]),
             rolling=touching is not None and touching["condim"] == 6 and bool(np.any(touching["friction"][3:])),
             rest_depth=self._rest_depth(pose),

@@ -5,9 +5,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from dropspin.comparisons.diagnosis.parts import mesh_shape
+from dropspin.comparisons.diagnosis.parts import mesh_shape, solid
 from dropspin.comparisons.engines.mujoco_model import UPWARD
-from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
+from dropspin.scenarios.bodies import Shape
 from dropspin.scenarios.state import Array
 
 MODELLED = [getattr(mujoco.mjtGeom, f"mjGEOM_{kind}") for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")]
@@ -17,21 +17,14 @@ STRAIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 
 def shape_of(model: Any, number: int) -> tuple[Shape, Array, Array]:
     """A geometry as a solid of 1 kg, with its centre [m] and its orientation in the frame of the geometry."""
-    size, kind = model.geom_size[number].tolist(), model.geom_type[number]
-    solid: dict[str, Any] = {"mass": 1.0, "inertia": "solid"}
-    along_z = np.roll(UPWARD, -1)  # capsules and cylinders are along y here
-    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        return Sphere(shape="sphere", radius=size[0], **solid), np.zeros(3), STRAIGHT
-    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        return Capsule(shape="capsule", radius=size[0], half_length=size[1], **solid), np.zeros(3), along_z
-    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        return Cylinder(shape="cylinder", radius=size[0], half_length=size[1], **solid), np.zeros(3), along_z
-    if kind == mujoco.mjtGeom.mjGEOM_BOX:
-        return Box(shape="box", half_extents=tuple(size), **solid), np.zeros(3), STRAIGHT
-    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-        return Ellipsoid(shape="ellipsoid", half_extents=tuple(size), **solid), np.zeros(3), STRAIGHT
-    shape = mesh_shape(*mesh_of(model, number))
-    return shape, shape.centre, STRAIGHT
+    size, kind = model.geom_size[number].tolist(), mujoco.mjtGeom(int(model.geom_type[number]))
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        shape = mesh_shape(*mesh_of(model, number))
+        return shape, shape.centre, STRAIGHT
+    name = kind.name.removeprefix("mjGEOM_").lower()
+    if name in ("capsule", "cylinder"):  # along y here
+        return solid(name, radius=size[0], half_length=size[1]), np.zeros(3), np.roll(UPWARD, -1)
+    return solid(name, **({"radius": size[0]} if name == "sphere" else {"half_extents": size})), np.zeros(3), STRAIGHT
 
 
 def mesh_of(model: Any, geom: int) -> tuple[Array, Any]:

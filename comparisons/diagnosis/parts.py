@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Mesh, Shape, Sphere
+from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Mesh, Shape, Sphere, body_of
 from dropspin.scenarios.bodies.hull import hull_corners
 from dropspin.scenarios.bodies.mesh import is_closed
 from dropspin.scenarios.bodies.mesh_files import Faces
@@ -70,7 +70,11 @@ def volume(shape: Shape) -> float:
     return math.nan
 
 
+def solid(shape: str, **sizes: Any) -> Shape:
+    """A solid of 1 kg."""
+    return body_of({"shape": shape, "mass": 1.0, "inertia": "solid", **sizes})
+
+
 def mesh_shape(points: Array, faces: Faces) -> Shape:
     """A mesh as a solid, or as a surface if it is not closed."""
-    inertia = "solid" if is_closed(points, faces) else "surface"
-    return Mesh.model_validate({"shape": "mesh", "points": points, "faces": faces, "mass": 1.0, "inertia": inertia})
+    return solid("mesh", points=points, faces=faces, **({} if is_closed(points, faces) else {"inertia": "surface"}))

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.parts import Part, mesh_shape
+from dropspin.comparisons.diagnosis.parts import Part, mesh_shape, solid
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.source import Element, Setting
 from dropspin.comparisons.diagnosis.urdf_file import UrdfFile
 from dropspin.comparisons.engines.pybullet_simulation import Z_TO_Y
 from dropspin.scenarios import DropspinError
-from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Shape, Sphere
+from dropspin.scenarios.bodies import Capsule, Cylinder, Shape
 from dropspin.scenarios.bodies.hull import convex_hull
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.rotations import conjugate, multiply, rotate
@@ -162,16 +162,15 @@ def _visual(file: UrdfFile, link: Element) -> Sequence[Any]:
 def _shape(file: UrdfFile, kind: int, sizes: Sequence[float], element: Element) -> Shape | None:
     """A geometry as a shape, None if it is not a solid of finite size; `sizes` are those that PyBullet has."""
     bullet = server()
-    solid: dict[str, Any] = {"mass": 1.0, "inertia": "solid"}
     used = [abs(size) for size in sizes[: {bullet.GEOM_SPHERE: 1, bullet.GEOM_CAPSULE: 2}.get(kind, 3)]]
     if not all(0.0 < size < math.inf for size in used):
         return None
     if kind == bullet.GEOM_SPHERE:
-        return Sphere(shape="sphere", radius=used[0], **solid)
+        return solid("sphere", radius=used[0])
     if kind == bullet.GEOM_BOX:
-        return Box(shape="box", half_extents=(0.5 * used[0], 0.5 * used[1], 0.5 * used[2]), **solid)
+        return solid("box", half_extents=[0.5 * size for size in used])
     if kind == bullet.GEOM_CAPSULE:
-        return Capsule(shape="capsule", half_length=0.5 * used[0], radius=used[1], **solid)
+        return solid("capsule", half_length=0.5 * used[0], radius=used[1])
     return _hull(file, element) if kind == bullet.GEOM_MESH else None
 
 

@@ -30,6 +30,8 @@ READERS = {".xml": ("mujoco",), ".mjcf": ("mujoco",), ".urdf": ("mujoco", "pybul
 MESH = """<mujoco><asset><mesh name="mesh" file="{path}"/></asset><worldbody><geom type="plane" size="0 0 1"/>
 <body name="{name}"><freejoint/><geom type="mesh" mesh="mesh" density="{density:g}"/></body></worldbody></mujoco>"""
 Found = TypeVar("Found")
+OF_FACTS = ("name", "engine", "version", "dt", "mass", "surface", "friction")
+"""What a diagnosis has as an engine has it in force."""
 QUESTIONS: tuple[Question, ...] = (fall, spin, tumble, worst_tumble, impact, rest, slide, creep, roll)
 
 
@@ -225,15 +227,9 @@ def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | 
         answers.append(Answer("friction", COEFFICIENT, "1", measured=facts.friction))
     answers += [Answer("file", key, "", findings=(Finding("changed", (key,), detail=made),)) for key, _, made in facts.ignored]
     found = BodyDiagnosis(
-        name=name,
-        engine=facts.engine,
-        version=facts.version,
-        dt=facts.dt,
-        mass=facts.mass,
+        **{field: getattr(facts, field) for field in OF_FACTS},
         shapes=tuple(part.shape.shape for part in facts.colliding),
-        surface=facts.surface,
         others=tuple(facts.others),
-        friction=facts.friction,
         answers=tuple(targets.judge(body, answer) for answer in answers),
         settings={**facts.settings, **{key: setting for key, setting, _ in facts.ignored}},
         unmodelled=tuple(facts.unmodelled),

@@ -1,6 +1,6 @@
 """`dropspin calibrate`."""
 
-from typing import Literal
+from typing import Any
 
 import click
 
@@ -10,22 +10,14 @@ from dropspin.reports.terminal.safe import echo
 
 
 @click.command("calibrate")
-@click.option("-e", "--engine", "engine_name", default="mujoco", metavar="ENGINE", help="The engine, with options.")
+@click.option("-e", "--engine", "engine", default="mujoco", metavar="ENGINE", help="The engine, with options.")
 @click.option("--restitution", type=click.FloatRange(0.0, 1.0), required=True, metavar="E", help="Coefficient of restitution.")
 @click.option("--dt", type=float, required=True, metavar="SECONDS", help="The time step.")
 @click.option("--friction", default="none", metavar="F", help="none, infinite or a coefficient.")
 @click.option("--shape", type=click.Choice(["ball", "box"]), default="ball", help="The shape that falls.")
 @click.option("--as", "language", metavar="LANGUAGE", help="Print only the text to paste: python, mjcf or urdf.")
 @as_json
-def calibrate_command(
-    engine_name: str,
-    restitution: float,
-    dt: float,
-    friction: str,
-    shape: Literal["ball", "box"],
-    language: str | None,
-    json_output: bool,
-) -> None:
+def calibrate_command(friction: str, language: str | None, json_output: bool, **options: Any) -> None:
     """Print the settings that give a coefficient of restitution at a time step, ready to paste, with measured results.
 
     MuJoCo's contact is a damper over one time step or, with -e mujoco[spring_steps=20], a spring over 20.
@@ -38,8 +30,8 @@ def calibrate_command(
 
     if language is not None and json_output:
         raise click.UsageError("--as prints one text and --json prints all of them; give only one of these options.")
-    with status(f"measuring {engine_name}"):
-        found = calibrate(engine_name, restitution, dt, view.friction(friction), shape)
+    with status(f"measuring {options['engine']}"):
+        found = calibrate(**options, friction=view.friction(friction))
     stop_if_interrupted()
     if language is not None:
         if language not in found.programs:

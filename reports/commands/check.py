@@ -16,7 +16,7 @@ from dropspin.reports.commands.options import BASELINE, as_json, summary_option,
 @summary_option
 @as_json
 def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str | None, summary: str | None, json_output: bool) -> int:
-    """Check a run: compare it with the expectations of its scenes, and with the accepted results of a baseline.
+    """Check a run against the expectations of its scenes, and against the accepted results of a baseline.
 
     RUN is the folder that dropspin run -o wrote. The output says which baseline was used.
 

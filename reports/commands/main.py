@@ -1,10 +1,13 @@
 """The command line: the group of commands, and the exit code of every error."""
 
+import ast
 import os
+import re
 import sys
 import traceback
 import warnings
 from importlib import import_module
+from pathlib import Path
 
 import click
 
@@ -13,47 +16,15 @@ from dropspin.reports.terminal.interrupts import handle_interrupts, stop_if_inte
 from dropspin.reports.terminal.streams import error_of, unfailing
 
 GROUPS = {
-    "Use": {
-        "run": "Run scenes with several engines, and write the report.",
-        "list": "List the scenes, the engines or the metrics.",
-        "show": "Show a scene, or the settings of an engine for the scene.",
-        "replay": "Show the motions of a run in 3D.",
-        "report": "Write the report of a run again.",
-        "diagnose": "Measure what the settings of your own model do.",
-        "calibrate": "Print the settings that give a coefficient of restitution at a time step.",
-    },
-    "Compare with a recording": {
-        "log check": "Check a recording of tosses by their free flight.",
-        "log fit": "Find friction and restitution of measured tosses.",
-        "log compare": "Compare engines with measured tosses.",
-    },
-    "Judge": {
-        "check": "Check a run against the expectations of its scenes and a baseline.",
-        "accept": "Accept a run's results as the new baseline.",
-        "compare": "Show which results changed between two runs, and the cause.",
-        "compare history": "Follow each result over runs, commits and versions.",
-    },
-    "Study": {
-        "tradeoff": "Measure what accuracy costs.",
-        "limits": "Find where engines break down.",
-        "symmetries": "Test whether engines keep symmetries and repeat their results.",
-        "symmetries twins": "Find the time step from which engines of the same algorithm differ.",
-        "sweep": "Run every job of a grid or random sample.",
-        "reproduce": "Compare published results with what engines give here.",
-    },
-    "Write an adapter": {
-        "new-adapter": "Write a working adapter, to change into that of your engine.",
-        "conform": "Check an engine adapter against the protocol and reference motions.",
-    },
-    "Maintain": {
-        "record": "Measure every release of each engine.",
-        "record rerun": "Measure a cell of the record again, bit for bit.",
-        "record publish": "Write the record of releases as a site.",
-        "doctor": "Check this installation.",
-    },
+    "Use": ("run", "list", "show", "replay", "report", "diagnose", "calibrate"),
+    "Compare with a recording": ("log check", "log fit", "log compare"),
+    "Judge": ("check", "accept", "compare", "compare history"),
+    "Study": ("tradeoff", "limits", "symmetries", "symmetries twins", "sweep", "reproduce"),
+    "Write an adapter": ("new-adapter", "conform"),
+    "Maintain": ("record", "record rerun", "record publish", "doctor"),
 }
-COMMANDS = {name: line for group in GROUPS.values() for name, line in group.items()}
-"""The commands, each in `reports/commands/`, in a file of its name with `_` for `-` and for spaces; with their lines in the help."""
+COMMANDS = [name for group in GROUPS.values() for name in group]
+"""The commands, each in `reports/commands/`, in a file of its name with `_` for `-` and for spaces."""
 MOVED = {name.rpartition(" ")[2]: name for name in ("compare history", "symmetries twins", "record rerun", "record publish")}
 """The commands that were commands of their own in earlier versions."""
 VERSION = """dropspin, version %(version)s
@@ -151,19 +122,30 @@ def _say(message: str) -> None:
     echo(f"dropspin: {line}", err=True)
 
 
+def _module_of(command: str) -> str:
+    return command.replace("-", "_").replace(" ", "_")
+
+
+def _line_of(command: str) -> str:
+    """The first sentence of the docstring of a command, read without an import."""
+    tree = ast.parse(Path(__file__).with_name(f"{_module_of(command)}.py").read_text(encoding="utf-8"))
+    text = next(ast.get_docstring(node) for node in tree.body if isinstance(node, ast.FunctionDef))
+    return re.split(r":|\.(?!\w)", text or "")[0] + "."
+
+
 class _LazyGroup(click.Group):
     """A group that imports a command only when it is called, so that the help imports no command."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
+        return COMMANDS
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
         words = 2 if " ".join(args[:2]) in COMMANDS else 1
         name = " ".join(args[:words])
         if name in MOVED:
             raise click.UsageError(f"{name} is now: dropspin {MOVED[name]}.")
-        if name not in COMMANDS and (below := {command: line for command, line in COMMANDS.items() if command.startswith(f"{name} ")}):
-            listed = {command.removeprefix(f"{name} "): click.Command(command, short_help=line) for command, line in below.items()}
+        if name not in COMMANDS and (below := [command for command in COMMANDS if command.startswith(f"{name} ")]):
+            listed = {command.removeprefix(f"{name} "): click.Command(command, short_help=_line_of(command)) for command in below}
             return name, click.Group(name, listed), args[1:]
         if name not in COMMANDS and not name.startswith("-"):
             from dropspin.scenarios import UnknownName
@@ -174,14 +156,14 @@ class _LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        module = cmd_name.replace("-", "_").replace(" ", "_")
+        module = _module_of(cmd_name)
         command: click.Command = getattr(import_module(f"dropspin.reports.commands.{module}"), f"{module}_command")
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        for title, commands in GROUPS.items():
+        for title, names in GROUPS.items():
             with formatter.section(title):
-                formatter.write_dl(list(commands.items()))
+                formatter.write_dl([(name, _line_of(name)) for name in names])
 
 
 @click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100, "show_default": True})

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dropspin.reports.commands.options import as_json, baseline_option, jobs_option, time_limit_option
+from dropspin.reports.commands.options import as_json, baseline_option, engines_option, jobs_option, output_option, time_limit_option
 from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo
 
@@ -23,24 +23,11 @@ CORE_ENGINES = ("wang", "mujoco", "pybullet")
 
 @click.command("run")
 @click.argument("scenes", nargs=-1, metavar="[SCENE]...")
-@click.option(
-    "-e",
-    "--engine",
-    "engines",
-    multiple=True,
-    metavar="ENGINE",
-    help="An engine, such as mujoco[integrator=rk4] (dropspin show ENGINE lists options); repeat for more.",
-)
+@engines_option
 @click.option(
     "--dt", "dts", multiple=True, type=float, metavar="SECONDS", help="A time step; repeat for more. [default: 0.004, 0.002, 0.001]"
 )
-@click.option(
-    "-o",
-    "--output",
-    default="out/run",
-    metavar="DIR",
-    help="Folder for the report and the data; an earlier run there is replaced.",
-)
+@output_option("out/run", "for the report and the data; an earlier run there is replaced")
 @click.option("--draw", "count", type=int, metavar="N", help="Add N random scenes, up to 1000, to the named ones.")
 @click.option("--seed", type=int, metavar="SEED", help="Seed of the random scenes. [default: a fresh seed, which is printed]")
 @click.option("--symmetries", "test_symmetries", is_flag=True, help="Also test the symmetries of each scene at the finest time step.")
@@ -77,7 +64,6 @@ def run_command(
     from dropspin.reports.stories.failures import failures
     from dropspin.reports.terminal.rows import print_document
     from dropspin.reports.terminal.run_table import print_table
-    from dropspin.reports.terminal.summary import print_summary
     from dropspin.scenarios import DropspinError, load, names
     from dropspin.scenarios.draw import draw
 
@@ -97,7 +83,7 @@ def run_command(
     results = _run(loaded, engines, asked, output, **options)
     try:
         if not json_output:
-            (print_table if verbose else print_summary)(results)
+            print_table(results, summary_only=not verbose)
         try:
             checked = check(results, None if file is None else file.baseline)
         except NothingAccepted as error:
@@ -158,7 +144,7 @@ def _run(
 
                 def keep(part: "Results") -> None:
                     measured.keep(part)
-                    shown.on_finished(*part.scenes)
+                    shown.on_finished(next(iter(part.scenes)), len(measured))
 
                 def on_forecast(forecast: "Forecast") -> None:
                     if sentence := forecast_sentence(forecast):

@@ -106,7 +106,9 @@ class Site:
     def since(self, label: str, scene: str) -> str:
         """The release since which nothing changed in a scene."""
         engine = self.engines[label]
-        return view.since(label, scene, self.measured[engine], self.changes[engine])
+        moved = [change.release for change in self.changes[engine] if (change.label, change.scene) == (label, scene)]
+        first = (release.name for release in self.measured[engine] if any(key[:2] == (label, scene) for key in release.cases))
+        return moved[-1] if moved else f"{next(first)}, the oldest"
 
     def quantity(self, scene: str) -> str:
         """The leading error of a scene, with its unit and, for one with a scale, the scale."""

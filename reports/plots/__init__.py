@@ -21,6 +21,7 @@ from dropspin.reports.plots.ensembles import rest_of_ensemble as rest_of_ensembl
 from dropspin.reports.plots.growth import error_growth as error_growth
 from dropspin.reports.plots.growth import plot_error_growth as plot_error_growth
 from dropspin.reports.plots.history import plot_history as plot_history
+from dropspin.reports.plots.history import result_over_runs as result_over_runs
 from dropspin.reports.plots.limits import failure_modes as failure_modes
 from dropspin.reports.plots.limits import plot_failure_modes as plot_failure_modes
 from dropspin.reports.plots.over_time import Quantity as Quantity

@@ -1,6 +1,6 @@
 """A chart as data: the lines of a plot with their labels, scales and remarks. matplotlib and the script of the report draw it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Dashes = Literal["", "dashed", "dotted"]
 DASHES: dict[Dashes, Any] = {"": "-", "dashed": (0, (3, 3)), "dotted": ":"}
 MARKER = 5.0  # points
+LONGEST_LEVEL_LABEL = 8  # characters of a tick of the x axis
 FLAT = 1e-9
 """Values that vary by less than this share of the largest value are drawn as constant, so that the axis does not show rounding errors."""
 
@@ -107,7 +108,8 @@ def draw(chart: Chart, axes: "Axes") -> None:
         middle = 0.5 * (low + high)
         axes.set_ylim(middle - 0.1 * abs(middle) - ROUNDING, middle + 0.1 * abs(middle) + ROUNDING)
     if chart.ticks:
-        axes.set_xticks(*zip(*chart.ticks, strict=True))
+        places, labels = zip(*chart.ticks, strict=True)
+        axes.set_xticks(places, labels, rotation=30.0 if max(map(len, labels)) > LONGEST_LEVEL_LABEL else 0.0)
         axes.minorticks_off()
     elif chart.x_log:
         label_powers(axes, "x")
@@ -155,11 +157,7 @@ def _in_lines(label: str) -> str:
     return f"{name}[" + ",\n".join(lines) + "]" if options else name
 
 
-Drawing = Callable[["Axes"], None]
-"""A function that draws into axes."""
-
-
-def figure_of(panels: Sequence[Chart | Drawing]) -> "Figure":
+def figure_of(panels: Sequence[Chart]) -> "Figure":
     """A figure of panels in the style of the report, at most three in a row, with one legend."""
     load_matplotlib()
     from matplotlib import rc_context
@@ -173,10 +171,7 @@ def figure_of(panels: Sequence[Chart | Drawing]) -> "Figure":
         figure = Figure(figsize=(3.7 * across, 2.9 * down), layout=ConstrainedLayoutEngine(w_pad=0.12))
         for place, panel in enumerate(panels, 1):
             axes = figure.add_subplot(down, across, place)
-            if isinstance(panel, Chart):
-                draw(panel, axes)
-            else:
-                panel(axes)
+            draw(panel, axes)
             for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
                 named.setdefault(label, handle)
         figure.legend(list(named.values()), list(named), loc="outside upper left", ncols=min(len(named), 5), fontsize=9)

@@ -1,66 +1,52 @@
-"""Results plotted over successive runs."""
+"""Results over successive runs."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dropspin.comparisons.regressions.comparing import History
+from dropspin.reports.plots.chart import Chart, Line, draw
 from dropspin.reports.plots.colours import engine_colours
-from dropspin.reports.plots.style import metric_label, power, thinner
+from dropspin.reports.plots.style import metric_label, thinner
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
 LONGEST_LABEL = 22
-SMALLEST, MOST_TICKS = 1e-3, 7
-"""Results below this fraction of the largest are drawn on a linear part of the axis around 0. The second number is the largest number of
-ticks.
-"""
 
 
-def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -> None:
-    """Draw a metric of each engine at the finest time step for a sequence of runs; a ring marks each run in which it changed.
+def result_over_runs(history: History, scene_name: str, metric: str) -> Chart:
+    """The absolute value of a metric at the finest time step over the runs, logarithmic; a square marks each run in which it changed.
 
     Args:
         history: The runs.
         scene_name: One of their scenes.
         metric: One of its metrics.
-        axes: The axes to draw into.
     """
-    from matplotlib.ticker import FuncFormatter, SymmetricalLogLocator
 
-    results = history.results
-    shown = results[(results["scene"] == scene_name) & (results["metric"] == metric) & ~results["kind"].isin(["order", "asymptotic_error"])]
-    steps = min(shown["steps"], key=float)
-    shown = shown[shown["steps"] == steps]
-    engines = list(dict.fromkeys(results["engine"]))
-    colours = engine_colours(engines)
-    for number, engine in enumerate(engines):
-        line = shown[shown["engine"] == engine].sort_values("run")
-        if line.empty:
-            continue
-        width = thinner(number, len(engines))
-        axes.plot(line["run"], line["value"], color=colours[engine], linewidth=width, marker="o", markersize=width + 1.5, label=engine)
-        moved = [move.run for move in history.moves if move.engine == engine and _has(move.results, scene_name, metric, steps)]
-        at = line[line["run"].isin(moved)]
-        axes.plot(at["run"], at["value"], "o", markersize=13.0, markerfacecolor="none", markeredgecolor=colours[engine])
-    sizes = shown["value"].abs()
-    if sizes.max() > 0.0:  # shows results that differ by orders of magnitude
-        smallest = max(float(sizes[sizes > 0.0].min()), SMALLEST * float(sizes.max()))
-        linear = float(10.0 ** np.floor(np.log10(smallest)))
-        axes.set_yscale("symlog", linthresh=linear)
-        ticks = SymmetricalLogLocator(linthresh=linear, base=10.0)
-        ticks.set_params(numticks=MOST_TICKS)
-        axes.yaxis.set_major_locator(ticks)
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _signed(value)))
-    axes.set_xlabel("run")
-    axes.set_xticks(np.arange(len(history.names)), run_labels(history), rotation=30, ha="right")
-    axes.set_ylabel(f"{metric_label(metric)}\nat {1e3 * float(steps):g} ms")
+    def of(results: "pd.DataFrame") -> "pd.DataFrame":
+        return results[
+            (results["scene"] == scene_name) & (results["metric"] == metric) & ~results["kind"].isin(["order", "asymptotic_error"])
+        ]
+
+    results = of(history.results)
+    steps = min(results["steps"], key=float)
+    colours, lines = engine_colours(list(dict.fromkeys(history.results["engine"]))), []
+    for number, (engine, colour) in enumerate(colours.items()):
+        mine = results[(results["engine"] == engine) & (results["steps"] == steps)].sort_values("run")
+        moved = [move.run for move in history.moves if move.engine == engine and (of(move.results)["steps"] == steps).any()]
+        runs, sizes = mine["run"].to_numpy(float), mine["value"].abs().to_numpy(float)
+        has_moved = np.isin(runs, moved)
+        lines.append(Line(engine, runs, sizes, colour, thinner(number, len(colours)), marker="o"))
+        lines.append(Line(engine, runs[has_moved], sizes[has_moved], colour, 0.0, marker="s"))
+    label = f"{metric_label(metric)}\nat {1e3 * float(steps):g} ms"
+    return Chart("run", label, [line for line in lines if len(line.x)], y_log=True, ticks=list(enumerate(run_labels(history))))
 
 
-def _signed(value: float) -> str:
-    return "0" if value == 0.0 else power(value) if value > 0.0 else f"−{power(-value)}"
+def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -> None:
+    """Draw `result_over_runs` into axes."""
+    draw(result_over_runs(history, scene_name, metric), axes)
 
 
 def run_labels(history: History) -> list[str]:
@@ -74,7 +60,3 @@ def run_labels(history: History) -> list[str]:
     if len(shown) == 1:
         return [str(value) if column == "commit" else f"{column} {value}" for column in shown for value in stamps[column]]
     return [", ".join(f"{column} {row[column]}" for column in shown)[:LONGEST_LABEL] for row in stamps.to_dict("records")]
-
-
-def _has(results: "pd.DataFrame", scene_name: str, metric: str, steps: str) -> bool:
-    return bool(((results["scene"] == scene_name) & (results["metric"] == metric) & (results["steps"] == steps)).any())

@@ -7,7 +7,6 @@ A free body conserves both, so its ω moves along the intersection of the two el
 Source: L. D. Landau & E. M. Lifshitz, Mechanics, section 37.
 """
 
-from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,8 +27,8 @@ FLATTEST = 0.4
 """Smallest length of the shortest half axis in the plot, relative to the longest."""
 NEARLY_PARALLEL = 1e-9
 """A body whose ω and L enclose an angle with a smaller sine counts as spinning about a principal axis."""
-VIEWS = tuple(product((-40, -20, 20, 40), range(-165, 180, 30)))
-"""Elevations and azimuths of the views [degrees]; no view is along an axis."""
+TOWARDS = np.array([0.48, 0.6, 0.64])
+"""The direction towards the viewer, but for the signs, which are those of the middle of the path."""
 LABEL_POSITION = 1.2
 """Position of the label of a half axis, as a multiple of its length."""
 LATITUDES, LONGITUDES = np.radians([-60.0, -30.0, 0.0, 30.0, 60.0]), np.radians([0.0, 30.0, 60.0, 90.0, 120.0, 150.0])
@@ -55,14 +54,20 @@ def polhode(results: Results, scene_name: str) -> Chart:
         raise DropspinError(f"{scene_name} has no initial angular velocity, so it has no polhode; set start.angular_velocity.")
     paths = polhode_paths(results, scene_name)
     reference = paths[-1][0] if paths else half_axes[None]
-    view = View(facing(reference, half_axes) if len(reference) > 1 else VIEWS[0], half_axes, [path for path, _ in paths])
-    lines = [Line("energy ellipsoid", *view(_wireframe(half_axes)), GREY, 0.5)]
+    towards = np.where(reference.mean(axis=0) < 0.0, -TOWARDS, TOWARDS)
+    right = np.cross([0.0, 0.0, 1.0], towards) / np.hypot(*towards[:2])
+    drawn = np.vstack([half_axes, *(np.abs(path) for path, _ in paths)]).max(axis=0)
+    screen = np.array([right, np.cross(towards, right)]) * np.maximum(1.0, FLATTEST * drawn.max() / drawn)  # a flat ellipsoid is stretched
+    x, y = screen @ _wireframe(half_axes).T
+    lines = [Line("energy ellipsoid", x, y, GREY, 0.5)]
     for path, style in paths:
-        x, y = view(path)
+        x, y = screen @ path.T
         lines.append(Line(x=x, y=y, **style | {"marker": ""}))
         if style.get("marker"):
             lines.append(Line(x=x[-1:], y=y[-1:], **style | {"width": 0.0}))
-    texts = [_name_of_axis(axis, view, half_axes) for axis in range(3)]
+    signs = np.sign(towards)
+    ends = (screen * LABEL_POSITION * signs * half_axes).T.tolist()
+    texts = [(x, y, f"{'−' if sign < 0.0 else ''}ω{subscript}") for (x, y), sign, subscript in zip(ends, signs, SUBSCRIPTS, strict=True)]
     remark = "Half axes of the energy ellipsoid: {:.3g}, {:.3g}, {:.3g} rad/s.".format(*half_axes)
     return Chart("", "", lines, is_map=True, texts=texts, remark=remark)
 
@@ -87,27 +92,6 @@ def plot_polhode(results: Results, scene_name: str, axes: "Axes") -> None:
     draw(polhode(results, scene_name), axes)
 
 
-class View:
-    """A parallel projection of angular velocities [rad/s]; a flat ellipsoid is stretched.
-
-    Attributes:
-        towards: The direction towards the viewer.
-    """
-
-    def __init__(self, view: tuple[float, float], half_axes: Array, paths: list[Array]) -> None:
-        azimuth = np.radians(view[1])
-        drawn = np.vstack([half_axes, *(np.abs(path) for path in paths)]).max(axis=0)
-        self.towards = _towards(view)
-        right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-        self._screen = np.array([right, cross(self.towards[None], right[None])[0]])
-        self._stretch = np.maximum(1.0, FLATTEST * drawn.max() / drawn)
-
-    def __call__(self, points: Array) -> tuple[Array, Array]:
-        """The screen coordinates of points of shape (n, 3): x to the right and y upwards, each of shape (n,)."""
-        x, y = self._screen @ (points * self._stretch).T
-        return x, y
-
-
 def principal_spin(scene: Scenario, motion: Trajectory) -> Array:
     """Angular velocity along the principal axes of the body, smallest moment first [rad/s], shape (n, 3)."""
     return unrotate(motion.orientation, motion.angular_velocity) @ _principal(scene)[1]
@@ -128,30 +112,6 @@ def wobbles_freely(scene: Scenario) -> bool:
     return bool(torque > NEARLY_PARALLEL * np.linalg.norm(momentum) * np.linalg.norm(start))
 
 
-def facing(path: Array, half_axes: Array) -> tuple[int, int]:
-    """The view in `VIEWS` in which the visible part of a path on an ellipsoid is longest.
-
-    The length of the path is used and not the time, because a body that flips spends most of the time on a short part of the path.
-
-    Args:
-        path: Angular velocities [rad/s], shape (n, 3).
-        half_axes: Half axes of the ellipsoid [rad/s], shape (3,).
-
-    Returns:
-        Elevation and azimuth [degrees].
-    """
-    steps, middles = np.diff(path, axis=0), 0.5 * (path[1:] + path[:-1])
-    speck = 1e-9 * float(half_axes.max())  # so that a path that is a point is on the near side too
-    lengths = np.linalg.norm(steps, axis=1) + speck
-    scores = []
-    for view in VIEWS:
-        towards = _towards(view)
-        near = lengths @ (middles / half_axes**2 @ towards > 0.0)
-        seen = np.linalg.norm(cross(steps, towards), axis=1).sum() + speck
-        scores.append(near * seen)
-    return VIEWS[int(np.argmax(scores))]
-
-
 def _principal(scene: Scenario) -> tuple[Array, Array]:
     """Principal moments of inertia, smallest first [kg m²], and their axes in the body frame, as columns of a right-handed triad."""
     moments, axes = np.linalg.eigh(scene.body.inertia_tensor)
@@ -168,22 +128,9 @@ def _in_sight(path: Array, half_axes: Array) -> Array:
     return path[: int(np.argmax(is_far))] if is_far.any() else path
 
 
-def _name_of_axis(axis: int, view: View, half_axes: Array) -> tuple[float, float, str]:
-    """Screen position and label of the near end of a half axis."""
-    sign = -1.0 if view.towards[axis] < 0.0 else 1.0
-    x, y = view(LABEL_POSITION * sign * half_axes[axis] * np.eye(3)[[axis]])
-    return float(x[0]), float(y[0]), f"{'−' if sign < 0.0 else ''}ω{SUBSCRIPTS[axis]}"
-
-
 def _wireframe(half_axes: Array) -> Array:
     """Circles of latitude and longitude on the ellipsoid, with NaN between them, shape (n, 3)."""
     around, gap = np.linspace(0.0, 2.0 * np.pi, 49), np.full((1, 3), np.nan)
     circles = [np.stack([np.cos(around) * np.cos(at), np.sin(around) * np.cos(at), np.full(49, np.sin(at))], axis=1) for at in LATITUDES]
     circles += [np.stack([np.sin(around) * np.cos(at), np.sin(around) * np.sin(at), np.cos(around)], axis=1) for at in LONGITUDES]
     return half_axes * np.concatenate([part for circle in circles for part in (circle, gap)])
-
-
-def _towards(view: tuple[float, float]) -> Array:
-    """The direction towards the viewer, from an elevation and an azimuth [degrees]."""
-    elevation, azimuth = np.radians(view)
-    return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])

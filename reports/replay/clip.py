@@ -120,7 +120,8 @@ def _draw(axes: "Axes3D", shape: Outline, replay: Replay, motion: Motion, time: 
 
     if time > motion.frames.t[-1] + 1e-9:
         return []
-    position, orientation = motion.pose(time)
+    frame = int(np.searchsorted(motion.frames.t, time + 1e-9, side="right")) - 1
+    position, orientation = motion.frames.position[frame], motion.frames.orientation[frame]
     if not replay.in_sight(position[None])[0]:
         return []
     own = shape.polygons(MERIDIANS)

@@ -12,7 +12,7 @@ from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.colours import EXACT, engine_colours
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 from dropspin.scenarios.mechanics import angular_momentum
-from dropspin.scenarios.rotations import about, angle_between_orientations, conjugate, cross, dot, multiply
+from dropspin.scenarios.rotations import angle_between_orientations, conjugate, cross, dot, multiply
 from dropspin.scenarios.state import UP
 
 Array = NDArray[np.float64]
@@ -68,26 +68,10 @@ class Motion:
     @np.errstate(over="ignore")  # an engine may return 1e300
     def turns(self) -> NDArray[np.intp]:
         """Whole turns from each frame to the next in addition to the shorter rotation, by the angular velocity; shape (frames - 1,)."""
-        axes, angles = self._rotations
+        axes, angles = axis_and_angle(multiply(self.frames.orientation[1:], conjugate(self.frames.orientation[:-1])))
         spins = 0.5 * (self.frames.angular_velocity[1:] + self.frames.angular_velocity[:-1])
         turns = (dot(spins, axes) * np.diff(self.frames.t) - angles) / (2.0 * np.pi)
         return np.rint(np.clip(turns, -MOST_TURNS, MOST_TURNS)).astype(np.intp)
-
-    def pose(self, time: float) -> tuple[Array, Array]:
-        """Position [m] and orientation at a time [s], interpolated between frames by linear motion and uniform rotation."""
-        t, x, q = self.frames.t, self.frames.position, self.frames.orientation
-        row = min(max(int(np.searchsorted(t, time + 1e-9, side="right")) - 1, 0), len(t) - 1)
-        if row == len(t) - 1:
-            return x[row], q[row]
-        share = max(0.0, (time - t[row]) / (t[row + 1] - t[row]))
-        axes, angles = self._rotations
-        angle = angles[row] + 2.0 * np.pi * self.turns[row]
-        return (1.0 - share) * x[row] + share * x[row + 1], multiply(about(axes[row], share * angle), q[row])
-
-    @cached_property
-    def _rotations(self) -> tuple[Array, Array]:
-        """Axis and angle [rad] of the shorter rotation from each orientation to the next, shapes (frames - 1, 3) and (frames - 1,)."""
-        return axis_and_angle(multiply(self.frames.orientation[1:], conjugate(self.frames.orientation[:-1])))
 
 
 def axis_and_angle(rotation: Array) -> tuple[Array, Array]:

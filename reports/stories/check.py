@@ -1,6 +1,5 @@
-"""The output of `dropspin check` and `accept`: the outcome of a check, and annotations for GitHub."""
+"""The output of `dropspin check` and `accept`: the outcome of a check."""
 
-import os
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
@@ -21,8 +20,6 @@ from dropspin.reports.stories.numbers import capitalized, failing
 from dropspin.scenarios.text import counted
 
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
-MOST_ANNOTATIONS = 10
-"""The number of annotations that GitHub shows for one step."""
 
 
 class BaselineFile(NamedTuple):
@@ -45,7 +42,7 @@ def document(checked: Checked, file: BaselineFile | None, failures: Sequence[Fai
     tallies = Table([_tally(results, engine) for engine in results.engines], on_terminal=False)
     versions = ", ".join(f"{name} {version}" for name, version in versions_behind(results.provenance).items())
     machine = Paragraph(f"{versions} on {results.provenance['cpu']}", on_terminal=False)
-    outcome = [Sentences([_scope(file), *notes]), Paragraph(verdict, on_page=False), *_annotations(failures)]
+    outcome = [Sentences([_scope(file), *notes]), Paragraph(verdict, on_page=False)]
     return Document(f"dropspin: {'✗' if listed else '✓'} {verdict}", [*listed, tallies, machine], outcome)
 
 
@@ -125,22 +122,3 @@ def accepted_sentences(results: Results, accepted: pd.DataFrame, known_failures:
     if tally.broken:
         notes.append(f"{counted(tally.broken, 'engine run')} broke down; results accepted earlier for them stay in the baseline.")
     return notes
-
-
-def _annotations(failures: Sequence[Failure]) -> list[Paragraph]:
-    """The workflow commands by which a runner of GitHub shows failures; empty elsewhere."""
-    if os.environ.get("GITHUB_ACTIONS") != "true":
-        return []
-    commands = []
-    for failure in failures[:MOST_ANNOTATIONS]:
-        title = _escaped(f"{failure.scene} {failure.engine}", ":,")
-        text = _escaped(f"{failure.sentence.removesuffix('.')}. Reproduce: {failure.reproduce}")
-        commands.append(Paragraph("", f"::error title={title}::{text}", on_page=False))
-    return commands
-
-
-def _escaped(text: str, more: str = "") -> str:
-    """Text escaped for GitHub's workflow commands; % is escaped first."""
-    for sign in f"%\r\n{more}":
-        text = text.replace(sign, f"%{ord(sign):02X}")
-    return text

@@ -45,7 +45,7 @@ def _tables(changes: Changes) -> list[Part]:
             more = f", the first {MOST_LINES} of {len(groups)} scenes and engines" if len(groups) > MOST_LINES else ""
             rows = [_row(group.iloc[0].to_dict(), len(group)) for group in groups[:MOST_LINES]]
             parts.append(Heading(f"{word}: {counted(len(changed), 'result')}{more}", on_terminal=True))
-            parts.append(Table(rows, lines=list(map(_line, rows))))
+            parts.append(Table(rows))
     return parts
 
 
@@ -71,16 +71,6 @@ def _row(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
         "tolerances": "–" if math.isnan(row["in_tolerances"]) else f"{row['in_tolerances']:.3g}",
         "others": counted(count - 1, "other result") if count > 1 else "–",
     }
-
-
-def _line(row: Mapping[str, str]) -> str:
-    """A row of a table as a line."""
-    ratio = "" if row["ratio"] == "–" else f", {row['ratio']} times"
-    away = "" if row["tolerances"] == "–" else f", {row['tolerances']} times its tolerance away"
-    others = "" if row["others"] == "–" else f"; and {row['others']}"
-    when = "as dt → 0" if row["step"] == "→ 0" else f"at {row['step']}"
-    change = f"{row['result']} {when} from {row['before']} to {row['now']}"
-    return f"  {row['scene']} · {row['engine']}: {change}{ratio}{away}{others}"
 
 
 def _notes(changes: Changes) -> list[str]:

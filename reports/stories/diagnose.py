@@ -13,24 +13,16 @@ from dropspin.comparisons.diagnosis.inertia import MOMENT
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis, Diagnosis
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
-from dropspin.reports.stories.numbers import formatted, grouped, in_ms, with_unit
+from dropspin.reports.stories.numbers import formatted, grouped, in_ms, listed, with_unit
 from dropspin.reports.stories.study import Study
 from dropspin.scenarios.text import counted
 
-KINDS = {
-    "impossible": "impossible",
-    "changed": "changed by the engine",
-    "time step": "time step",
-    "setting": "setting",
-    "model": "engine",
-    "target": "target missed",
-}
-"""The words for the kinds of findings."""
+KINDS = {"changed": "changed by the engine", "model": "engine", "target": "target missed"}
+"""The words for some kinds of findings; for others their names."""
 LEAST = 1e-9
 """Values below this are rounding, but for moments of inertia."""
 STARTS = {"slide": (" from", " at"), "roll": (" from", "")}
 """What stands before the speed and the direction of a start, if not `at` and `about`."""
-MOST_NAMES = 4
 COLUMNS = (
     "dt = …: measured at this time step. Exact: the exact solution with the damping, armature and margin in force. "
     "Ideal: the exact solution without these. In parentheses: the range over eight phases of the impact within a time step."
@@ -72,6 +64,10 @@ class Diagnosed(Study):
         return Document(f"Diagnosis of {self.diagnosis.file}", parts, [Paragraph(summary(self.diagnosis))])
 
 
+def _kind(finding: Finding) -> str:
+    return KINDS.get(finding.kind, finding.kind)
+
+
 def _finding_cells(body: BodyDiagnosis, answer: Answer, finding: Finding | None) -> dict[str, str]:
     """The columns of a finding, empty for none."""
     if finding is None:
@@ -84,7 +80,7 @@ def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
     """What a page says of a body; a terminal that shows a table of several bodies does not show it."""
     if body.breakdown:
         return [Paragraph(f"{body.name}: {body.breakdown.removesuffix('.')}.", style="bold", on_terminal=on_terminal)]
-    others = f" (or {_listed(body.others)}, by --on)" if body.others else ""
+    others = f" (or {listed(body.others)}, by --on)" if body.others else ""
     lands = f"; lands on {body.surface}{others}, friction {body.friction:g}" if body.surface else "; lands on nothing"
     what = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg"
     head = f"{what}; {body.engine} {body.version}, time step {in_ms(body.dt)}{lands}."
@@ -111,15 +107,11 @@ def of_several(bodies: Sequence[BodyDiagnosis]) -> list[str]:
         owner = " ".join([body.name] * (len(names) > 1) + [body.engine] * (len(engines) > 1))
         for sentence in [f"{body.breakdown.removesuffix('.')}."] if body.breakdown else [*sentences(body), *_left_out(body)]:
             owners.setdefault(sentence, []).append(owner)
-    return [f"{_listed(of_sentence)}: {sentence}" for sentence, of_sentence in owners.items()]
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names) if len(names) <= MOST_NAMES else f"{', '.join(names[:MOST_NAMES])} and {len(names) - MOST_NAMES} more"
+    return [f"{listed(of_sentence)}: {sentence}" for sentence, of_sentence in owners.items()]
 
 
 def _overview(body: BodyDiagnosis) -> dict[str, str]:
-    kinds = [KINDS[finding.kind] for _, finding in body.findings]
+    kinds = [_kind(finding) for _, finding in body.findings]
     found = ", ".join(f"{kind} ({kinds.count(kind)})" if kinds.count(kind) > 1 else kind for kind in dict.fromkeys(kinds))
     return {
         "body": body.name,
@@ -140,7 +132,7 @@ def answer_rows(body: BodyDiagnosis) -> list[dict[str, str]]:
     shown = [answer for answer in body.answers if answer not in moments and answer.question not in ("file", "friction")]
     for _, group in groupby(shown, lambda answer: (answer.question, answer.quantity, _cells(answer))):
         same = list(group)
-        kinds = ", ".join(dict.fromkeys(KINDS[finding.kind] for finding in same[0].findings))
+        kinds = ", ".join(dict.fromkeys(_kind(finding) for finding in same[0].findings))
         rows.append(_row(body, same[0].question, _together(same), *_cells(same[0]), kinds))
     return rows
 
@@ -181,7 +173,7 @@ def sentences(body: BodyDiagnosis) -> list[str]:
         stated = grouped(same, _statement).items()
         what = "; ".join(f"{_together([answer for answer, _ in those])} {statement}" for statement, those in stated)
         where = ", ".join(_settings(body, finding))
-        sentence = f"{question.capitalize()}, {KINDS[finding.kind]}: {what}" + (f": {where}." if where else ".")
+        sentence = f"{question.capitalize()}, {_kind(finding)}: {what}" + (f": {where}." if where else ".")
         found.append(" ".join([sentence, *_remedies(*same)]))
     return found
 
@@ -258,7 +250,7 @@ def differences(bodies: Sequence[BodyDiagnosis]) -> list[dict[str, str]]:
 
 def summary(diagnosis: Diagnosis) -> str:
     """The number of findings and of bodies that have any."""
-    kinds = [KINDS[finding.kind] for body in diagnosis.bodies for _, finding in body.findings]
+    kinds = [_kind(finding) for body in diagnosis.bodies for _, finding in body.findings]
     text = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
     broken = sum(bool(body.breakdown) for body in diagnosis.bodies)
     return f"{counted(len(kinds), 'finding')}{f' ({text})' if text else ''}{f'; {broken} without a result' if broken else ''}."
@@ -269,16 +261,8 @@ def charts(body: BodyDiagnosis) -> list[Chart]:
     impacts = [answer for answer in body.answers if answer.quantity == REBOUND]
     if not any(answer.most > 0.0 for answer in impacts):
         return []
-    speeds = np.array([answer.speed for answer in impacts])
-    lines = [
-        Line(
-            f"dt = {in_ms(body.dt)}",
-            speeds,
-            np.array([answer.measured for answer in impacts]),
-            marker="o",
-            low=np.array([answer.least for answer in impacts]),
-            high=np.array([answer.most for answer in impacts]),
-        ),
-        Line("as dt → 0", speeds, np.array([answer.limit for answer in impacts]), dashes="dashed", marker="s"),
-    ]
+    rows = [(answer.speed, answer.measured, answer.least, answer.most, answer.limit) for answer in impacts]
+    speeds, measured, least, most, limit = np.array(rows).T
+    lines = [Line(f"dt = {in_ms(body.dt)}", speeds, measured, marker="o", low=least, high=most)]
+    lines.append(Line("as dt → 0", speeds, limit, dashes="dashed", marker="s"))
     return [Chart("impact speed [m/s]", "rebound speed / impact speed", lines)]

@@ -14,12 +14,10 @@ from dropspin.comparisons.regressions.causes import WrongParameter, causes
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.running.processes import ResourceLimits
 from dropspin.reports.document import Paragraph, Part, Sentences
-from dropspin.reports.stories.numbers import bound, formatted, grouped, in_ms, step, subject, word
+from dropspin.reports.stories.numbers import bound, formatted, grouped, in_ms, listed, step, subject, word
 from dropspin.scenarios.text import counted, rounded
 
 Row = Mapping[Hashable, Any]
-MOST_NAMES = 4
-"""Largest number of names in a sentence."""
 SEVERAL = 1.02
 """Sum of shares from which on they are those of alternatives."""
 MOST_ON_PAGE, MOST_ON_TERMINAL = 24, 6
@@ -137,7 +135,7 @@ def settings_that_explain(results: Results, engine: str) -> list[str]:
     alike = grouped(by_scene.items(), lambda one: (one[0][1], *(row["truth"] for row in one[1])))
     sentences = []
     for ((scene, metric, dt), rows), *others in alike.values():
-        also = f"; the same settings in {_listed([where for (where, *_), _ in others])}" if others else ""
+        also = f"; the same settings in {listed([where for (where, *_), _ in others])}" if others else ""
         what = f"of the {subject(metric, 'truth', '')} at {in_ms(dt)}"
         sentences.append(f"{scene}: {_with_shares(rows, what)}{also}.")
     return sentences
@@ -170,18 +168,13 @@ def _of_one_cause(failures: Sequence[Failure]) -> str:
     first, *others = failures
     more = ""
     if others and first.broke_down:
-        more = f"; the same in {_listed(list(dict.fromkeys(failure.scene for failure in others)))}"
+        more = f"; the same in {listed(list(dict.fromkeys(failure.scene for failure in others)))}"
     elif others:
         results = list(dict.fromkeys(failure.result for failure in others if failure.result not in ("", first.result)))
         count = sum(1 + failure.others for failure in others)
         fail = counted(count, "other result of this scene fails", "other results of this scene fail")
-        more = f"; {fail}" + (f" ({_listed(results)})" if results else "")
+        more = f"; {fail}" + (f" ({listed(results)})" if results else "")
     return f"{first.sentence.rstrip('.')}{more}."
-
-
-def _listed(names: Sequence[str]) -> str:
-    """The first `MOST_NAMES` names, separated by commas, and the number of the others."""
-    return ", ".join(names[:MOST_NAMES]) + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
 
 
 def what_fails(row: Row) -> str:

@@ -90,11 +90,6 @@ class ProfileComparison:
             f"(median share {100 * statistics.median(parts):.1f} %)"
         )
 
-    @property
-    def sentence(self) -> str:
-        """The comparison in one sentence."""
-        return f"{self.engine}: {self.clause}."
-
 
 def profile_comparisons(results: Results) -> list[ProfileComparison]:
     """For each engine that was run with default and with calibrated settings, the share of its errors that is due to the settings."""

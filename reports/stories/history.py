@@ -1,10 +1,8 @@
 """The output of `dropspin compare history`: the runs in which results changed."""
 
-from functools import partial
-
 from dropspin.comparisons.regressions.comparing import History
 from dropspin.reports.document import Charts, Document, Heading, Part, Sentences, Table
-from dropspin.reports.plots.history import plot_history
+from dropspin.reports.plots.history import result_over_runs
 from dropspin.reports.stories.compare import change_cells
 from dropspin.reports.stories.numbers import capitalized
 from dropspin.scenarios.text import counted
@@ -23,16 +21,11 @@ def document(history: History) -> Document:
     scenes = counted(history.results["scene"].nunique(), "scene")
     unchanged = f"No result changed in {counted(len(history.names), 'run')} of {scenes}."
     changed = rows(history)
-    lines = [
-        f"{row['run']} · {row['engine']} · {row['scene']}: "
-        f"{row['result']} at {row['step']} from {row['before']} to {row['now']}, {row['change']}"
-        for row in changed
-    ]
-    parts: list[Part] = [Table(changed, lines=lines), Sentences(causes or [unchanged])]
+    parts: list[Part] = [Table(changed), Sentences(causes or [unchanged])]
     drawn = history.results[~history.results["kind"].isin(["order", "asymptotic_error"])]
     for scene in history.results["scene"].unique():
         metrics = drawn.loc[drawn["scene"] == scene, "metric"].unique()
-        parts += [Heading(scene), Charts(scene, drawings=[partial(plot_history, history, scene, metric) for metric in metrics])]
+        parts += [Heading(scene), Charts(scene, [result_over_runs(history, scene, metric) for metric in metrics])]
     return Document(f"Results over {len(history.names)} runs", parts)
 
 

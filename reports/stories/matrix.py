@@ -10,6 +10,7 @@ from dropspin.comparisons.judging.verdicts import VERDICTS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.results import UNDECIDED, Results, Status
+from dropspin.reports.stories.numbers import formatted, in_ms, quantity, unit
 
 MOST_SCENES = 24
 """Largest number of rows on a terminal. Of more scenes, those in which no engine has a finding are left out first, then those with the
@@ -52,6 +53,20 @@ def leading_errors(results: Results) -> dict[str, Leading]:
             sizes = {engine: float(values.get(engine, math.nan)) for engine in results.engines}
             found[name] = Leading(metric, unit, dt, of, sizes, {engine: level(size / of) for engine, size in sizes.items()})
     return found
+
+
+def matrix_of(results: Results, statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[dict[str, str]], list[str]]:
+    """A row for each scene that a terminal shows, with the mark of the status and the leading error of each engine; and notes."""
+    scenes, left_out = shown_scenes(statuses)
+    leading, rows = leading_errors(results), []
+    steps = sorted({in_ms(errors.dt) for errors in leading.values()})
+    title = f"error at dt = {' or '.join(steps)}" if steps else "error"
+    for scene in scenes:
+        errors = leading.get(scene)
+        sizes = {engine: formatted(size) for engine, size in errors.sizes.items() if not math.isnan(size)} if errors else {}
+        values = {engine: f"{status.mark} {sizes.get(engine, '')}".rstrip() for engine, status in statuses[scene].items()}
+        rows.append({"scene": scene, title: quantity(errors.metric) + unit(errors.unit) if errors else "", **values})
+    return rows, list(filter(None, [legend_of_marks({scene: statuses[scene] for scene in scenes}), left_out]))
 
 
 def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> str:

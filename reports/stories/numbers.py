@@ -1,7 +1,7 @@
 """The format of numbers, bounds and verdicts in all output."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from typing import TypeVar
 
@@ -61,6 +61,11 @@ def failing(count: int, total: int, what: str) -> str:
 def capitalized(sentence: str) -> str:
     """A sentence with a capital first letter."""
     return sentence[:1].upper() + sentence[1:]
+
+
+def listed(names: Sequence[str], most: int = 4) -> str:
+    """The first names, separated by commas, and the number of the others."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def grouped(items: Iterable[Item], key: Callable[[Item], Key]) -> dict[Key, list[Item]]:

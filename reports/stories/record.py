@@ -1,7 +1,7 @@
 """The pages of a record in words: the digits in a cell, what changed in a release, and what an engine gets right and wrong."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from shlex import quote
 from typing import Any, NamedTuple
 
@@ -130,14 +130,6 @@ def summary(release: Release, label: str, dt: float) -> list[str]:
 
     groups = grouped(cases, group)
     return [f"{words}: {', '.join(groups[words])}" for words in dict.fromkeys([*GROUPS, *groups]) if words in groups]
-
-
-def since(label: str, scene: str, releases: Sequence[Release], changed: Iterable[Change]) -> str:
-    """The release since which nothing changed in a scene."""
-    moved = [change.release for change in changed if (change.label, change.scene) == (label, scene)]
-    if moved:
-        return moved[-1]
-    return f"{next(one.name for one in releases if any(key[:2] == (label, scene) for key in one.cases))}, the oldest"
 
 
 def changes_in_words(changed: Sequence[Change]) -> str:

@@ -1,14 +1,14 @@
 """The output of `dropspin run`: the overview of a run, computed once for terminal, HTML and Markdown."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.results.results import Results, Status
 from dropspin.comparisons.running.forecast import Forecast
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from dropspin.reports.document import Document, Paragraph, Part, Sentences, Table
-from dropspin.reports.stories.failures import Failure, failures, reproduce_drawn
+from dropspin.reports.stories.failures import Failure, failure_parts, failures, reproduce_drawn
 from dropspin.reports.stories.findings import (
     Counts,
     ProfileComparison,
@@ -18,6 +18,7 @@ from dropspin.reports.stories.findings import (
     verdict_sentence,
 )
 from dropspin.reports.stories.impact_laws import NOTE, law_rows
+from dropspin.reports.stories.matrix import matrix_of
 from dropspin.scenarios.text import counted
 
 
@@ -51,18 +52,40 @@ def overview(results: Results) -> Overview:
     return Overview(verdict_sentence(results, tally), findings, tally, results.statuses(), profiles, failures(results), law_rows(results))
 
 
-def document(results: Results, summary: Overview) -> Document:
-    """A short report: findings, the status of each engine in each scene, distances to other impact laws, and failures."""
+def document(results: Results, summary: Overview, tables: Sequence[Part] = ()) -> Document:
+    """A short report: findings, the status of each engine in each scene, distances to other impact laws, and failures.
+
+    Args:
+        results: The run.
+        summary: Its overview.
+        tables: What a terminal shows first.
+    """
     statuses = [
         {"scene": scene, **{engine: f"{status.mark} {status.words}" for engine, status in by_engine.items()}}
         for scene, by_engine in summary.statuses.items()
     ]
-    laws: list[Part] = [Paragraph(NOTE), Table(summary.laws)] if summary.laws else []
+    laws: list[Part] = []
+    if summary.laws:
+        differing = counted(len({row["scene"] for row in summary.laws}), "scene")
+        others = "the report lists each engine's distances to the other laws, which are not errors."
+        laws = [Paragraph(NOTE, on_terminal=False), Table(summary.laws, on_terminal=False)]
+        laws.append(Paragraph(f"Impact laws differ in {differing}: {others}", style="dim", on_page=False))
     failed = [f"✗ {failure.sentence}" for failure in summary.failures]
-    listed = Sentences(failed, commands=[failure.reproduce for failure in summary.failures])
+    listed = Sentences(failed, commands=[failure.reproduce for failure in summary.failures], on_terminal=False)
     versions = ", ".join(f"{name} {version or 'not installed'}" for name, version in results.provenance["versions"].items())
-    parts = [Table(statuses), *laws, listed, Paragraph(f"{versions} on {results.provenance['cpu']}")]
-    return Document("dropspin", parts, [Paragraph(summary.verdict, style="bold"), Sentences(summary.findings)])
+    matrix, notes = matrix_of(results, summary.statuses)
+    parts = [
+        *tables,
+        Sentences(summary.findings, on_page=False),
+        Table(matrix, [*reversed(results.engines)], on_page=False),
+        Sentences(notes, style="dim", on_page=False),
+        Table(statuses, on_terminal=False),
+        *laws,
+        listed,
+        *(replace(part, on_page=False) for part in failure_parts(results, [one for one in summary.failures if not one.accepted])),
+        Paragraph(f"{versions} on {results.provenance['cpu']}", on_terminal=False),
+    ]
+    return Document("dropspin", parts, [Paragraph(summary.verdict, style="bold"), Sentences(summary.findings, on_terminal=False)])
 
 
 def _quick(results: Results) -> list[str]:

@@ -12,14 +12,14 @@ from dropspin.reports.stories.numbers import grouped
 from dropspin.reports.stories.study import Study
 
 COLUMNS = ("scene", "engine", "symmetry", "status", "difference", "step", "time", "reason")
-MARKS: dict[Status, str] = {"kept": "✓", "rounding": "≈", "nearly kept": "~", "lost": "✗", "not run": "–"}
 MEANINGS: dict[Status, str] = {
-    "kept": "kept up to rounding",
-    "rounding": "above 1e-5, but rounding explains it",
-    "nearly kept": "up to 1e-5, but more than rounding explains",
-    "lost": "lost",
-    "not run": "not run",
+    "kept": "✓ kept up to rounding",
+    "rounding": "≈ above 1e-5, but rounding explains it",
+    "nearly kept": "~ up to 1e-5, but more than rounding explains",
+    "lost": "✗ lost",
+    "not run": "– not run",
 }
+"""The mark of each status, and its meaning."""
 
 
 class Symmetries(Study):
@@ -53,9 +53,9 @@ def _of(findings: Sequence[Finding], engine: str, symmetry: str) -> list[Finding
 
 def _cell(findings: Sequence[Finding]) -> str:
     if not findings or findings[0].status == "not run":
-        return MARKS["not run"]
+        return "–"
     worst = findings[0]
-    return f"{MARKS[worst.status]} {worst.difference:.0e}" if worst.difference else f"{MARKS[worst.status]} 0"
+    return f"{MEANINGS[worst.status][0]} {worst.difference:.0e}" if worst.difference else f"{MEANINGS[worst.status][0]} 0"
 
 
 def worst_lost(findings: Sequence[Finding]) -> list[Finding]:
@@ -66,7 +66,7 @@ def worst_lost(findings: Sequence[Finding]) -> list[Finding]:
 
 def legend(findings: Sequence[Finding]) -> str:
     """The meaning of the numbers, and of each mark that occurs."""
-    marks = ", ".join(f"{MARKS[status]} {MEANINGS[status]}" for status in STATUSES if any(finding.status == status for finding in findings))
+    marks = ", ".join(MEANINGS[status] for status in STATUSES if any(finding.status == status for finding in findings))
     return f"Each number is the largest difference of two motions of any scene, in radians or relative to sizes and speeds. {marks}."
 
 

@@ -11,7 +11,7 @@ from dropspin.comparisons.tradeoff.errors import Ladder
 from dropspin.comparisons.tradeoff.points import LEVEL, CostPoint, TradeOff, spread
 from dropspin.reports.document import Charts, Document, Heading, Part, Sentences, Table
 from dropspin.reports.plots.figures import tradeoff_charts
-from dropspin.reports.stories.numbers import duration, formatted, grouped, left_out
+from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, left_out
 from dropspin.reports.stories.study import Study
 from dropspin.scenarios.text import counted, rounded
 
@@ -108,7 +108,7 @@ def pareto_front_rows(found: TradeOff) -> list[dict[str, str]]:
 def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
     """Sentences: the cheapest configuration within each tolerance, memory, the end of each ladder, and engines left out."""
     ended = grouped([ladder for ladder in found.ladders if ladder.steps], _reason)
-    ends = {reason: ", ".join(f"{ladder.engine} at {_step(ladder.steps[-1][0])}" for ladder in alike) for reason, alike in ended.items()}
+    ends = {reason: ", ".join(f"{ladder.engine} at {in_ms(ladder.steps[-1][0])}" for ladder in alike) for reason, alike in ended.items()}
     memory = ", ".join(f"{label} {rounded(value / 1e3, 2)} kB" for label, value in found.memory_per_world.items())
     return [
         *(_recommendation(found, tolerance) for tolerance in within),
@@ -128,7 +128,7 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
         nearest = min(found.points, key=lambda point: point.error)
         ladder = next(ladder for ladder in found.ladders if ladder.engine == nearest.engine)
         last, error = ladder.steps[-1][0], f"{formatted(nearest.error)}{unit}"
-        ended = f"its ladder of time steps ended at {_step(last)}"
+        ended = f"its ladder of time steps ended at {in_ms(last)}"
         if nearest.error <= tolerance:
             none = "no configuration is within it at its time step and at all smaller ones"
             found_here = f"{none}; {_named(nearest)} has {error}, but more at smaller time steps; {ended}"
@@ -177,9 +177,5 @@ def _reason(ladder: Ladder) -> str:
     return ladder.reason + (" (option --budget)" if ladder.ended == "budget" else "")
 
 
-def _step(dt: float) -> str:
-    return f"{1e3 * dt:.4g} ms"
-
-
 def _named(point: CostPoint) -> str:
-    return f"{point.engine} at {_step(point.dt)}"
+    return f"{point.engine} at {in_ms(point.dt)}"

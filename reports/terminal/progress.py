@@ -21,25 +21,20 @@ class RunProgress(NamedTuple):
 
     Attributes:
         on_progress: To be called as `run` calls it.
-        on_finished: To be called with the name of each scene that is finished; scenes run in parallel.
+        on_finished: To be called with the name of each scene that is finished and the number of those that are; scenes run in parallel.
         show_line: Prints a line.
     """
 
     on_progress: OnProgress
-    on_finished: Callable[[str], None]
+    on_finished: Callable[[str, int], None]
     show_line: Callable[[str], None]
 
 
 @contextmanager
 def progress_bar(scenes: int, pieces: int) -> Iterator[RunProgress]:
-    """A progress bar of scenes on a terminal; elsewhere, a line when a scene starts and when it is finished, with the elapsed time."""
-    start, done, has_timed = time.monotonic(), 0, False
-    started: dict[str, None] = {}
-    finished: set[str] = set()
+    """A progress bar of scenes on a terminal; elsewhere, a line when a scene is finished, with the elapsed time."""
+    start, done, finished, has_timed = time.monotonic(), 0, 0, False
     shares: dict[str, float] = {}  # of the pieces of work that are not finished, by scene
-
-    def of_all() -> str:
-        return f"{len(finished)} of {counted(scenes, 'scene')}"
 
     def show_line(text: str) -> None:
         if bar.disable:
@@ -50,28 +45,21 @@ def progress_bar(scenes: int, pieces: int) -> Iterator[RunProgress]:
     def on_progress(progress: Progress) -> None:
         nonlocal done, has_timed
         stop_if_interrupted()
-        name, is_new = progress.scene, not progress.timing and progress.scene not in {*started, *finished}
-        if is_new and progress.finished:  # in an interrupted run, of which only the end is reported
-            finished.add(name)
-        elif is_new:
-            started[name] = None
-        if not bar.disable:
-            done += progress.finished
-            shares[name] = 0.0 if progress.added or progress.finished or not progress.total else progress.done / progress.total
-            description = safe(f"{of_all()} finished; {_described(progress)}")
-            bar.update(task, completed=done + sum(shares.values()), description=description)
-        elif progress.timing and not has_timed:
-            has_timed = True
-            show_line("timing the steps of each engine")
-        elif is_new and not progress.finished:
-            show_line(f"running {name} ({of_all()} finished, {_duration(time.monotonic() - start)} elapsed)")
-
-    def on_finished(scene: str) -> None:
-        finished.add(scene)
         if bar.disable:
-            running = ", ".join(name for name in list(started) if name not in finished)
-            elapsed = f"{_duration(time.monotonic() - start)} elapsed"
-            show_line(f"finished {scene} ({of_all()}, {elapsed}{running and f'; still running: {running}'})")
+            if progress.timing and not has_timed:
+                show_line("timing the steps of each engine")
+            has_timed = has_timed or progress.timing
+            return
+        done += progress.finished
+        shares[progress.scene] = 0.0 if progress.added or progress.finished or not progress.total else progress.done / progress.total
+        description = safe(f"{finished} of {counted(scenes, 'scene')} finished; {_described(progress)}")
+        bar.update(task, completed=done + sum(shares.values()), description=description)
+
+    def on_finished(scene: str, count: int) -> None:
+        nonlocal finished
+        finished = count
+        if bar.disable:
+            show_line(f"finished {scene} ({finished} of {counted(scenes, 'scene')}, {_duration(time.monotonic() - start)} elapsed)")
 
     with _bar(BarColumn(bar_width=20), TaskProgressColumn(), TimeRemainingColumn()) as bar:
         task = bar.add_task("starting", total=float(scenes * pieces))

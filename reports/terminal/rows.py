@@ -43,9 +43,6 @@ def print_document(document: Document, console: Console | None = None) -> None:
             case Sentences(items, style=style):
                 for sentence in items:
                     print_sentence(sentence, console, style)
-            case Table(lines=lines) if lines:
-                for line in lines:
-                    print_sentence(line, console)
             case Table(rows, left_out_first) if rows:
                 print_rows(rows, left_out_first, console)
 

@@ -1,7 +1,6 @@
 """An ellipsoid."""
 
 import math
-from functools import cached_property
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -21,10 +20,6 @@ class Ellipsoid(Shape):
     shape: Literal["ellipsoid"]
     half_extents: PositiveVector
     inertia: Literal["solid", "surface"] | Moments = "solid"
-
-    @cached_property
-    def corners(self) -> Array:
-        return np.zeros((1, 3))
 
     @property
     def semi_axes(self) -> Array:

@@ -77,10 +77,10 @@ class Shape(Table):
     def _has_offset(self) -> bool:
         return any(self.center_of_mass or ())
 
-    @property
-    @abstractmethod
+    @cached_property
     def corners(self) -> Array:
         """The points whose convex hull the shape is, apart from the ellipsoids about them, in the frame of the shape [m], shape (n, 3)."""
+        return np.zeros((1, 3))
 
     @cached_property
     def vertices(self) -> Array:

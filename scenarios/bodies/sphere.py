@@ -1,7 +1,6 @@
 """A ball: one vertex at the centre of mass, rounded by the radius."""
 
 import math
-from functools import cached_property
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -21,10 +20,6 @@ class Sphere(Shape):
     shape: Literal["sphere"]
     radius: Positive
     inertia: Literal["solid", "surface"] | Moments = "solid"
-
-    @cached_property
-    def corners(self) -> Array:
-        return np.zeros((1, 3))
 
     @property
     def semi_axes(self) -> Array:

@@ -40,7 +40,7 @@ import numpy as np
 
 from dropspin.scenarios.bodies import OnAxis
 from dropspin.scenarios.model import TOUCHING, Scenario
-from dropspin.scenarios.rotations import cross, dot, length, rotate, unrotate
+from dropspin.scenarios.rotations import cross, crossing, dot, length, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.truths.truth import Truth
@@ -118,15 +118,15 @@ class _Contact:
             orientation: Shape (4,).
             spin: In the body frame [rad/s], shape (3,).
         """
-        turn = _crossing(orientation[:3])
+        turn = crossing(orientation[:3])
         to_body = np.eye(3) - 2.0 * float(orientation[3]) * turn + 2.0 * turn @ turn
-        up, turns = to_body[:, 1], _crossing(spin)
+        up, turns = to_body[:, 1], crossing(spin)
         stretched, turning = self.squares * up, -turns @ up
         depth = float(np.sqrt(stretched @ up)) or 1.0  # of a corner, 0
         arm = self.vertex - stretched / depth
         moved = (self.squares * turning - stretched * (stretched @ turning) / depth**2) / depth
         drawn = to_body @ self.gravity + turns @ (turns @ arm - moved)
-        lever = _crossing(arm)
+        lever = crossing(arm)
         levers = lever if self.is_rough else np.outer(lever @ up, up)
         torque = -turns @ (self.inertia @ spin) - self.mass * levers @ drawn
         response = self.inertia + self.mass * levers @ levers.T
@@ -140,12 +140,6 @@ class _Contact:
         if self.squares[1] > 0.0 or not self.squares.any():
             return lowest
         return min(lowest, float(length(np.sqrt(self.squares) * up) - FLATTEST * np.sqrt(self.squares[0])))
-
-
-def _crossing(a: Array) -> Array:
-    """The matrix of the vector product with a vector, shape (3, 3)."""
-    x, y, z = a.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _contact(scene: Scenario, *, is_rough: bool) -> _Contact | None:

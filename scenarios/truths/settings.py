@@ -23,7 +23,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dropspin.scenarios.rotations import multiply, rotate, unrotate
+from dropspin.scenarios.rotations import crossing, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, VELOCITY, Array
 from dropspin.scenarios.truths.flight import phi1, phi2
 
@@ -180,7 +180,7 @@ def free_motion(
 
     c = np.zeros(3) if centre is None else np.asarray(centre, dtype=float)
     # Unknown: acceleration of the centre of mass and ω', in the body frame; u' = v' + c × ω' - ω × (ω × c)
-    lever = _times(c)
+    lever = crossing(c)
     matrix = np.block(
         [
             [(mass + armature) * np.eye(3), armature * lever],
@@ -191,7 +191,7 @@ def free_motion(
 
     def rates(_: float, state: Array) -> Array:
         velocity, spin = state[VELOCITY], state[SPIN]
-        to_world, turning = _matrix(*state[ORIENTATION].tolist()), _times(spin)
+        to_world, turning = _matrix(*state[ORIENTATION].tolist()), crossing(spin)
         circling = turning @ c
         force, torque = resistance(velocity - to_world @ circling, spin)
         force = force @ to_world + armature * (turning @ circling)
@@ -207,12 +207,6 @@ def free_motion(
     states[:, ORIENTATION] /= np.linalg.norm(states[:, ORIENTATION], axis=1, keepdims=True)
     states[:, SPIN] = rotate(states[:, ORIENTATION], states[:, SPIN])
     return states
-
-
-def _times(a: Array) -> Array:
-    """The matrix of a ×, shape (3, 3)."""
-    x, y, z = a.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _matrix(x: float, y: float, z: float, w: float) -> Array:

@@ -1,28 +1,23 @@
-"""Rest on MuJoCo's soft contacts: the depth at which a contact carries its load, and the speed of its creep on a slope that holds.
+"""Rest on MuJoCo's soft contacts: the depth at which a contact carries its load.
 
-A constraint with the impedance d, the stiffness K, the damping B and the regularisation R = (1 - d)/d A has the force, at rest or in steady
-motion, f = (K d r - B v)/R, with the depth r and the velocity v; A is the inverse mass of the constraint. With solref = (t_c, ζ), or
-(-k, -b), and d_m, the second number of solimp:
+A constraint with the impedance d, the stiffness K and the regularisation R = (1 - d)/d A has, at rest, the force f = K d r/R, with the
+depth r; A is the inverse mass of the constraint. With solref = (t_c, ζ), or (-k, -b), and d_m, the second number of solimp:
 
-    K = 1/(d_m t_c ζ)² or k/d_m²,   B = 2/(d_m t_c) or b/d_m,   d = d(r) by solimp
+    K = 1/(d_m t_c ζ)² or k/d_m²,   d = d(r) by solimp
 
 A contact of the load a = A F, where F is its normal force, rests at the depth
 
     r = k (1 - d) a / (K d²),   k = 1 (elliptic cone, condim 1),   k = µ² (1 + µ²)/((condim - 1) impratio) (pyramidal cone)
 
 because the 2 (condim - 1) edges of a pyramid have R = 2 µ² (1 + µ²)/impratio (1 - d)/d A. For µ = 1 and impratio 1, k is 2/(condim - 1).
-The friction of an elliptic cone has R/impratio and no stiffness, so that a tangential force needs a creep of
-
-    v = (1 - d)/d A F_t / (B impratio)
 
 Source: MuJoCo documentation, chapters Computation (constraint model) and Modeling (solver parameters, contact parameters); the
 pyramid's R is that of `efc_R` (tests compare all of this with MuJoCo).
-Valid for: MuJoCo 4, contacts without adhesion, surface velocity and `solreffriction`, no iterations of the noslip solver; creep along an
-axis of the contact frame (of pyramidal cones, it is up to 3 % faster and up to 3° off the pull in other directions).
+Valid for: MuJoCo 4, contacts without adhesion and surface velocity.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 SMALLEST, LARGEST = 1e-4, 0.9999
@@ -111,16 +106,16 @@ class SoftContact:
         return smallest + rise * (largest - smallest)
 
     @property
-    def reference(self) -> tuple[float, float]:
-        """K [1/s²] and B [1/s] of the reference acceleration -B v - K d r. A solref of mixed signs is replaced with the default."""
+    def stiffness(self) -> float:
+        """K [1/s²]. A solref of mixed signs is replaced with the default."""
         first, second = self.settings.solref
         if (first > 0.0) != (second > 0.0):
             first, second = GeomSettings.solref
         largest = _in_range(self.settings.solimp[1])
         if first <= 0.0:
-            return -first / largest**2, -second / largest
+            return -first / largest**2
         first = max(first, 2.0 * self.time_step)
-        return 1.0 / (largest * first * second) ** 2, 2.0 / (largest * first)
+        return 1.0 / (largest * first * second) ** 2
 
     def depth(self, load: float) -> float:
         """The depth at rest below the margin [m], infinite without stiffness; the gap is `settings.margin` less the depth.
@@ -128,66 +123,14 @@ class SoftContact:
         Args:
             load: A F [m/s²], g of a ball on the floor and g/n of each of n contacts that share a weight.
         """
-        stiffness, _ = self.reference
+        stiffness = self.stiffness
         if not stiffness:
             return math.inf if load else 0.0
         return self._root(lambda r: stiffness * r * self.impedance(r) / self._softness(r) - load)
 
-    def friction(self, load: float, speed: float) -> float:
-        """The friction of a contact that creeps along an axis of its frame, times A [m/s²].
-
-        Args:
-            load: A F of the normal force [m/s²].
-            speed: Tangential speed [m/s].
-        """
-        stiffness, damping = self.reference
-        if self.settings.condim == 1:
-            return 0.0
-        most = self._coefficient * load
-        if self.elliptic:
-            d = self.impedance(self.depth(load))
-            return min(damping * speed * self.impratio * d / (1.0 - d), most)
-        slip, others = damping * self._coefficient * speed, 2 * (self.settings.condim - 2)
-
-        def edges(r: float) -> tuple[float, float, float]:
-            """Forces of the edges along, against and, together, across the creep."""
-            pressed, softness = stiffness * self.impedance(r) * r, 2 * (self.settings.condim - 1) * self._softness(r)
-            return (pressed + slip) / softness, max(pressed - slip, 0.0) / softness, others * pressed / softness
-
-        if sum(edges(0.0)) >= load:
-            return most
-        along, against, _ = edges(self._root(lambda r: sum(edges(r)) - load))
-        return self._coefficient * (along - against)
-
-    def creep(self, pull: float, loads: Sequence[float]) -> float:
-        """The steady speed of a body that friction holds against a tangential force along an axis of the contact frames [m/s].
-
-        Of a box on a slope of the angle θ, whose centre is h above the floor and w from the edges across the slope, each of the four
-        contacts has the load g/4 (cos θ ± sin θ h/w); the pull is g sin θ.
-
-        Args:
-            pull: A F of the tangential force of all contacts together [m/s²].
-            loads: A F of the normal force of each contact [m/s²].
-
-        Returns:
-            0 without a pull, infinite if the contacts do not hold.
-        """
-        from scipy.optimize import brentq
-
-        if pull >= self._coefficient * sum(loads) or self.settings.condim == 1:
-            return math.inf if pull else 0.0
-        fastest = 1e-9
-        while sum(self.friction(load, fastest) for load in loads) < pull:
-            fastest *= 2.0
-        return float(brentq(lambda v: sum(self.friction(load, v) for load in loads) - pull, 0.0, fastest, xtol=1e-300, rtol=1e-13))
-
-    @property
-    def _coefficient(self) -> float:
-        return max(self.settings.friction[0], LEAST_FRICTION)
-
     def _softness(self, depth: float) -> float:
         """R/A of the normal force: k (1 - d)/d."""
-        d, mu2 = self.impedance(depth), self._coefficient**2
+        d, mu2 = self.impedance(depth), max(self.settings.friction[0], LEAST_FRICTION) ** 2
         pyramid = not self.elliptic and self.settings.condim > 1
         k = mu2 * (1.0 + mu2) / ((self.settings.condim - 1) * self.impratio) if pyramid else 1.0
         return k * (1.0 - d) / d

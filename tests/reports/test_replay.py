@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from support.cli import dropspin
+from support.frames import a_quarter_later
 
 import dropspin as ds
 from dropspin.comparisons.results.store import save
@@ -59,7 +60,7 @@ def test_interpolation_between_frames_follows_the_angular_velocity():
     assert 500.0 * replay.interval > np.pi
     for motion in replay.motions:
         for frame in (0, 7, len(motion.frames) - 2):
-            q = motion.pose((frame + 0.25) * replay.interval)[1]
+            q = a_quarter_later(motion, frame)
             expected = multiply(
                 about(np.array(scene.start.angular_velocity) / 500.0, 125.0 * replay.interval), motion.frames.orientation[frame]
             )

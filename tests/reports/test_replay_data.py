@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.frames import a_quarter_later
 
 import dropspin as ds
 from dropspin.reports.replay import Replay, as_data, replay_of
@@ -91,7 +92,7 @@ def test_turns_between_frames_are_counted_from_the_rounded_attitudes():
     assert {*turns} == {-1, 0} or {*turns} == {0, 1}
     np.testing.assert_array_equal(turns, rounded.turns)
     for frame in range(100):
-        quarter = rounded.pose(t[frame] + 0.0025)[1]
+        quarter = a_quarter_later(rounded, frame)
         assert angle_between_orientations(quarter, about(np.array([0.6, 0.0, 0.8]), angle * (frame + 0.25))) < 3e-4
 
 

@@ -37,8 +37,8 @@ def test_malformed_file_is_rejected_with_its_message(path):
     ("body", "message"),
     [
         ({"mas": 2.0}, "scene['body']['mas']: unknown key. Allowed: mass, center_of_mass, shape, radius, inertia. Did you mean 'mass'?"),
-        ({"mas": 2.0, "raduis": 0.1}, "Did you mean 'mass'? (and 1 more problem)"),
-        ({"radius": -1.0, "mas": 2.0}, "Did you mean 'mass'? (and 1 more problem)"),
+        ({"mas": 2.0, "raduis": 0.1}, "Did you mean 'mass'?"),
+        ({"radius": -1.0, "mas": 2.0}, "Did you mean 'mass'?"),
         ({"radius": 0.1, "mass": 1.0, "inertai": 1.0}, "Did you mean 'inertia'?"),
     ],
 )
@@ -58,14 +58,8 @@ def test_misspelt_table_is_named_first(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("model.xml", b'<mujoco model="x"><worldbody/></mujoco>', "is an MJCF model in XML; a scene is a TOML file in UTF-8."),
-        (
-            "model.urdf",
-            b'<?xml version="1.0"?>\n<!-- a > b -->\n<robot name="x"/>',
-            "is a URDF model in XML; a scene is a TOML file in UTF-8.",
-        ),
-        ("page.toml", b"<!DOCTYPE html><html></html>", "is a file in XML; a scene is a TOML file in UTF-8."),
-        ("scene.json", b'{"duration": 1.0}', "is a file in JSON; a scene is a TOML file in UTF-8."),
+        ("model.xml", b'<mujoco model="x"><worldbody/></mujoco>', "not TOML: *; a scene is a TOML file in UTF-8."),
+        ("scene.json", b'{"duration": 1.0}', "not TOML: *; a scene is a TOML file in UTF-8."),
         ("scene.yaml", b"duration: 1.0\nbody:\n", "not TOML: *(at line 1, column 9); a scene is a TOML file in UTF-8."),
         ("program", b"\x7fELF\x02\x00\xf8", "is a binary file, which is not UTF-8 text; a scene is a TOML file in UTF-8."),
     ],

@@ -1,4 +1,4 @@
-"""Depth at rest and creep on MuJoCo's soft contacts, compared with 25 digits by mpmath and with MuJoCo itself, settled to rest."""
+"""Depth at rest on MuJoCo's soft contacts, compared with 25 digits by mpmath and with MuJoCo itself, settled to rest."""
 
 import math
 
@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from dropspin.scenarios.truths.soft_rest import LEAST_FRICTION, GeomSettings, SoftContact, mixed
+from dropspin.scenarios.truths.soft_rest import GeomSettings, SoftContact, mixed
 
 G = 9.81
 BALL = 'type="sphere" size=".05"'
@@ -148,7 +148,7 @@ def test_time_constant_is_kept_with_refsafe_disabled():
 
 
 @pytest.mark.parametrize("solref", [".03 .9", ".0001 1", "-2500 -90", ".03 -5"])
-def test_stiffness_and_damping_are_those_of_mujoco(solref, tmp_path, monkeypatch):
+def test_stiffness_is_that_of_mujoco(solref, tmp_path, monkeypatch):
     """A solref of mixed signs is replaced with the default; MuJoCo warns of it on the terminal and in a file of the current folder."""
     import mujoco
 
@@ -157,50 +157,11 @@ def test_stiffness_and_damping_are_those_of_mujoco(solref, tmp_path, monkeypatch
     data = mujoco.MjData(model)
     data.qpos[2] = 0.0499
     mujoco.mj_forward(model, data)
-    np.testing.assert_allclose(data.efc_KBIP.reshape(-1, 4)[0, :2], contact_of(model).reference, rtol=1e-14)
+    assert data.efc_KBIP.reshape(-1, 4)[0, 0] == pytest.approx(contact_of(model).stiffness, rel=1e-14)
 
 
 def test_depth_without_stiffness_is_infinite():
     assert SoftContact(GeomSettings(solref=(0.0, -5.0))).depth(G) == math.inf
-
-
-@pytest.mark.parametrize("degrees", [10, 20, math.degrees(math.atan(0.5)), 30])
-@pytest.mark.parametrize(("option", "accuracy"), [("", 1e-3), ('cone="elliptic"', 3e-3), ('cone="elliptic" impratio="10"', 3e-3)])
-def test_cube_creeps_down_a_slope_that_holds(degrees, option, accuracy):
-    """What is left is the tilt, which the loads leave out: 7e-4, and of elliptic cones 1e-5 up to 27° and 3e-3 at 30°.
-
-    At 30°, two contacts slip within the hold of the others.
-    """
-    import mujoco
-
-    down, into = G * math.sin(math.radians(degrees)), G * math.cos(math.radians(degrees))
-    model = model_of(shape=CUBE, option=option, gravity=(down, 0.0, -into))
-    data = mujoco.MjData(model)
-    data.qpos[2] = 0.025
-    mujoco.mj_step(model, data, 1500)
-    start = data.qpos[0]
-    mujoco.mj_step(model, data, 500)
-    loads = [(into + side * down) / 4.0 for side in (1.0, 1.0, -1.0, -1.0)]
-    creep = contact_of(model).creep(down, loads)
-    assert (data.qpos[0] - start) / 0.5 == pytest.approx(creep, rel=accuracy)
-
-
-def test_creep_at_a_slope_of_one_half():
-    """The settings of MuJoCo's default, of elliptic cones and of those with impratio 10: 2.85, 1.14 and .114 mm/s."""
-    down, into = G / math.sqrt(5.0), 2.0 * G / math.sqrt(5.0)
-    loads = [(into + side * down) / 4.0 for side in (1.0, 1.0, -1.0, -1.0)]
-    settings = GeomSettings()
-    contacts = SoftContact(settings), SoftContact(settings, elliptic=True), SoftContact(settings, elliptic=True, impratio=10.0)
-    found = [contact.creep(down, loads) for contact in contacts]
-    np.testing.assert_allclose(found, [2.846e-3, 1.143e-3, 1.143e-4], rtol=1e-3)
-
-
-def test_contacts_that_do_not_hold_have_no_creep():
-    contact = SoftContact(GeomSettings(friction=(0.5, 0.005, 0.0001)))
-    assert contact.creep(0.0, [G]) == 0.0
-    assert contact.creep(0.51 * G, [G]) == math.inf
-    assert SoftContact(GeomSettings(condim=1)).creep(1e-9, [G]) == math.inf
-    assert SoftContact(GeomSettings(friction=(0.0, 0.0, 0.0))).creep(2.0 * LEAST_FRICTION * G, [G]) == math.inf
 
 
 def test_body_stops_at_the_first_depth_that_carries_it():

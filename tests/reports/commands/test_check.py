@@ -186,16 +186,6 @@ def test_known_failures_are_counted_apart(metric, accepted, outcome):
     assert sentences(check(found, base), BaselineFile(base, "b.toml", "out")) == outcome
 
 
-def test_annotations_are_for_github(repository):
-    """Commands that its runner reads, only there, and no more than it shows."""
-    quiet = dropspin("check", "out/crashing", *BASELINE, cwd=repository)
-    assert "::error" not in quiet.stdout
-    loud = dropspin("check", "out/crashing", *BASELINE, cwd=repository, GITHUB_ACTIONS="true")
-    commands = [line for line in loud.stdout.splitlines() if line.startswith("::")]
-    assert 0 < len(commands) <= 10
-    assert commands[0].startswith("::error title=drop-ball my-engine::drop-ball · ")
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -15,9 +15,9 @@ def test_compare_says_what_got_worse_and_why(repository, tmp_path):
     assert done.returncode == 1
     output = " ".join(done.stdout.split())
     assert "Attributed to the engine: my-engine good → failing, its settings (restitution)." in output
-    assert re.search(r"Worse: \d+ results drop-ball · my-engine: restitution error at \d ms from \S+ to 5\.00e-03, ", output)
+    assert re.search(r"Worse: \d+ results scene engine .* drop-ball my-engine restitution error \d ms \S+ 5\.00e-03 ", output)
     headings = re.findall(r"^(?:Worse|Gone|Moved|Better|New): ", done.stdout, re.MULTILINE)
-    assert done.stdout.count("  drop-ball · my-engine: ") == len(headings) > 0  # one line for each kind of change
+    assert len(re.findall(r"(?m)^drop-ball +my-engine ", done.stdout)) == len(headings) > 0  # one row for each kind of change
     assert output.count("Reproduce: dropspin run drop-ball -e my_engine:MyEngine --dt 0.008 --dt 0.004 --dt 0.002 -o out/again") == 1
     assert "| drop-ball | my-engine | restitution error |" in (tmp_path / "summary.md").read_text()
     data = json.loads(dropspin("compare", "out/good", "out/failing", "--json", cwd=repository).stdout)

@@ -16,7 +16,7 @@ def show_command(scene: str, engine_name: str | None, dt: float, json_output: bo
     Of an engine: its options, and the settings of its library that can be given as options. Of a mesh (.obj, .stl): its volume, mass
     properties, hull and defects.
     """
-    from dropspin.comparisons.engines.registry import engine_names, parsed
+    from dropspin.comparisons.engines.registry import engine_names
     from dropspin.reports.document import Document, Table
     from dropspin.reports.stories import show
     from dropspin.reports.stories.mesh import mesh_rows
@@ -25,7 +25,7 @@ def show_command(scene: str, engine_name: str | None, dt: float, json_output: bo
 
     if scene.lower().endswith((".obj", ".stl")):
         name, rows = scene, mesh_rows(scene)
-    elif engine_name is None and (":" in scene or parsed(scene)[0] in engine_names()):
+    elif engine_name is None and (":" in scene or scene.partition("[")[0] in engine_names()):
         name, rows = scene, show.setting_rows(scene)
     else:
         loaded = load(scene)

@@ -10,9 +10,8 @@ from dropspin.comparisons.robustness.axes import AXES
 from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, ScanPoint
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.plots.figures import limits_charts
-from dropspin.reports.stories.numbers import left_out
+from dropspin.reports.stories.numbers import duration, left_out
 from dropspin.reports.stories.study import Study
-from dropspin.scenarios.text import rounded
 
 ACCURATE_AND_STABLE = "Accurate: sound at every smaller tested time step. Stable: there, errors beyond the tolerance are the only failures."
 COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterion", "size", "message")
@@ -54,7 +53,7 @@ def _rows(found: RobustnessStudy) -> list[dict[str, Any]]:
 def nominal(found: RobustnessStudy) -> str:
     """The conditions of a study: scene, time step and tolerance. An axis may vary the time step."""
     return (
-        f"{found.scene.name} at dt = {_step(found.dt)}. "
+        f"{found.scene.name} at dt = {duration(found.dt)}. "
         f"Sound: the engine does not fail, and its errors are at most {found.within:g} (ratios, and angles in rad)."
     )
 
@@ -74,13 +73,9 @@ def step_rows(studies: Sequence[RobustnessStudy]) -> list[dict[str, str]]:
 def _largest(dt: float | None, tried: Sequence[ScanPoint], spin: float) -> str:
     """The largest time step that meets a condition, or, if none does, the smallest tested one with its failure mode."""
     if dt is None:
-        return f"{_mode(tried[0])} at {_step(tried[0].value)}, the smallest tested"
+        return f"{_mode(tried[0])} at {duration(tried[0].value)}, the smallest tested"
     turn = f", {spin * dt:.2g} rad" if spin else ""
-    return _step(dt) + turn + (", the largest tested" if dt == tried[-1].value else "")
-
-
-def _step(dt: float) -> str:
-    return f"{rounded(1e3 * dt, 3)} ms" if dt < 0.9995 else f"{rounded(dt, 3)} s"
+    return duration(dt) + turn + (", the largest tested" if dt == tried[-1].value else "")
 
 
 def _mode(point: ScanPoint) -> str:
@@ -122,11 +117,11 @@ def sentences(found: RobustnessStudy) -> list[str]:
 
 def _refinement(engine: str, points: Sequence[ScanPoint]) -> str:
     nominal, *smaller = points
-    where = f"{engine} is not sound at the nominal values and dt = {_step(nominal.value)}"
+    where = f"{engine} is not sound at the nominal values and dt = {duration(nominal.value)}"
     sentence = f"{where}: {_mode(nominal)}, {nominal.diagnosis.message}."
     if not smaller:
         return f"{sentence} No smaller time step was tried."
-    tried = [f"{mode} at {', '.join(_step(point.value) for point in group)}" for mode, group in groupby(smaller, _mode)]
+    tried = [f"{mode} at {', '.join(duration(point.value) for point in group)}" for mode, group in groupby(smaller, _mode)]
     sentence += f" Smaller time steps tried: {'; '.join(tried)}."
     last = smaller[-1]
-    return sentence if last.mode == "sound" else f"{sentence} At {_step(last.value)}, the smallest tried, {last.diagnosis.message}."
+    return sentence if last.mode == "sound" else f"{sentence} At {duration(last.value)}, the smallest tried, {last.diagnosis.message}."

@@ -7,7 +7,7 @@ from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.results.results import Results, Status
 from dropspin.comparisons.running.forecast import Forecast
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
-from dropspin.reports.document import Document, Paragraph, Part, Sentences, Table
+from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.stories.failures import Failure, failure_parts, failures, reproduce_drawn
 from dropspin.reports.stories.findings import (
     Counts,
@@ -76,6 +76,7 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = ()) -
     matrix, notes = matrix_of(results, summary.statuses)
     parts = [
         *tables,
+        Heading("Summary", on_page=False, on_terminal=bool(tables)),
         Sentences(summary.findings, on_page=False),
         Table(matrix, [*reversed(results.engines)], on_page=False),
         Sentences(notes, style="dim", on_page=False),

@@ -8,6 +8,7 @@ centre of mass, friction and restitution, the time step; then the noise floor, a
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, pairwise
 from pathlib import Path
 
@@ -159,11 +160,7 @@ def log_compare(
     starts = usable(flights)
     measured, dt = recorded(starts), time_step(starts)
     given = {entry.label: _given(flights, starts, dt, fit, entry.label) for entry in entries}
-
-    def all_errors(entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> dict[str, Array] | Breakdown:
-        return _errors(entry, given[entry.label], measured, processes, report)
-
-    found, left_out = of_each_engine(entries, all_errors, on_progress, resources, jobs)
+    found, left_out = of_each_engine(entries, partial(_errors, given, measured), on_progress, resources, jobs)
     pairs = [pair for number, kind in enumerate(KINDS) if kind in COMPARED for pair in _pairs(kind, number, found)]
     return LogComparison(
         len(starts),
@@ -206,11 +203,15 @@ def _given(flights: Flights, starts: Sequence[Start], dt: float, fit: LogFit | N
 
 
 def _errors(
-    entry: EngineEntry, given: Sequence[_Given], measured: Array, processes: EngineProcesses, report: Callable[[str], None]
+    all_given: Mapping[str, Sequence[_Given]],
+    measured: Array,
+    entry: EngineEntry,
+    processes: EngineProcesses,
+    report: Callable[[str], None],
 ) -> dict[str, Array] | Breakdown:
     """The errors of each toss by what was given, shape (m, kinds); those of drawn starts are differences from the motion as given."""
     found: dict[str, Array] = {}
-    nominal = measured
+    nominal, given = measured, all_given[entry.label]
     for one in given:
         report(f"{entry.label}, {one.what}")
         result = processes.call(entry, poses, [one.scene], one.launched, one.dt)

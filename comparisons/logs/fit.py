@@ -13,6 +13,7 @@ the two parameters is refined around the estimates of all resamples.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations, pairwise
 from pathlib import Path
 
@@ -139,14 +140,12 @@ class _Profile:
     """The estimates of an engine in resamples of the tosses.
 
     Attributes:
-        axes: The last grid of each parameter.
         lower: The least values that are as good as the best, by resample and parameter, shape (RESAMPLES, 2).
         upper: The largest ones.
         value: The estimate from the tosses themselves, shape (2,).
         discrepancy: δ [m].
     """
 
-    axes: tuple[Array, ...]
     lower: Array
     upper: Array
     value: Array
@@ -179,12 +178,8 @@ def log_fit(
         DropspinError: The recording has no floor, or too few tosses with frames after a flight.
     """
     entries, problem = engine_entries(engines, ENGINES), _problem(flights_in(recording), frames)
+    profiles, left_out = of_each_engine(entries, partial(_profile, problem), on_progress, resources, jobs)
     size = len(problem.measured)
-
-    def profile(entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> _Profile | Breakdown:
-        return _profile(entry, problem, processes, report)
-
-    profiles, left_out = of_each_engine(entries, profile, on_progress, resources, jobs)
     estimates = [_estimate(label, one, column, size) for label, one in profiles.items() for column in range(len(FIRST_GRID))]
     pairs = [
         _disagreement(first, second, profiles[first], profiles[second], column, size)
@@ -210,7 +205,7 @@ def _problem(flights: Flights, frames: int) -> _Problem:
     return _Problem(scene, dt, recorded(starts, frames)[:, 1:], launched, perturbed, header, np.tile(noise**2, frames))
 
 
-def _profile(entry: EngineEntry, problem: _Problem, processes: EngineProcesses, report: Callable[[str], None]) -> _Profile | Breakdown:
+def _profile(problem: _Problem, entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> _Profile | Breakdown:
     """The estimates of an engine in resamples of the tosses, on grids that are refined around them."""
     axes, counts = tuple(FIRST_GRID.values()), resamples(len(problem.measured))
     for number in range(1, MOST_GRIDS + 1):
@@ -227,11 +222,9 @@ def _profile(entry: EngineEntry, problem: _Problem, processes: EngineProcesses, 
         nominal = tracked(problem.header, found[best])[:, 1:]
         derivatives = _differences(problem, np.repeat(nominal, 12, axis=0), around)[0].reshape(*nominal.shape[:1], 12, -1)
         losses, discrepancy = _losses(residuals, derivatives, problem.variances)
-        profile = _Profile(axes, *_best(losses, axes, counts), discrepancy)
-        refined = [
-            _refined(axis, tried, profile.lower[:, column], profile.upper[:, column])
-            for column, (axis, tried) in enumerate(zip(axes, FIRST_GRID.values(), strict=True))
-        ]
+        profile = _Profile(*_best(losses, axes, counts), discrepancy)
+        each = zip(axes, FIRST_GRID.values(), profile.lower.T, profile.upper.T, strict=True)
+        refined = [_refined(*of_axis) for of_axis in each]
         if all(new is None for new in refined):
             break
         axes = tuple(axis if new is None else new for axis, new in zip(axes, refined, strict=True))

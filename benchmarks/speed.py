@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from dropspin import reference_impl, scenarios
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.results.provenance import processor, versions
-from dropspin.reference_impl import lanes
 from dropspin.reference_impl.methods import ROTATIONS
 from dropspin.reference_impl.threads import usable_cores
 
@@ -274,7 +273,7 @@ def main() -> None:
     results["a floor that is not reached"] = report("a floor that is not reached", timed(floors()), "wang, no floor")
     first = {f"{kind}, {width}": first_call(kind == "cached", width) for width in ("one body", "ensemble") for kind in ("cold", "cached")}
     print("\nfirst call in a new process: " + "; ".join(f"{label} {seconds:.2f} s" for label, seconds in first.items()))
-    stamp = {"versions": versions(), "cpu": processor(), "lanes": lanes.WIDTH}
+    stamp = {"versions": versions(), "cpu": processor()}
     (OUT / "bench.json").write_text(json.dumps({"results": results, "leads": leads, "first_call": first} | stamp, indent=1))
     plot(results, OUT / "bench.svg")
     print(f"Written: {OUT / 'bench.json'}, {OUT / 'bench.svg'}")

@@ -4,7 +4,7 @@ import math
 
 from numpy import float32
 
-from dropspin.reference_impl.vectors import Vec3, compiled, dot, row, select
+from dropspin.reference_impl.vectors import Vec3, compiled, dot, row
 
 N = Vec3(0.0, 1.0, 0.0)
 """The floor's unit normal, upwards."""
@@ -90,11 +90,12 @@ def _surface(r, R, semi_axes, radius, place):
     ball = Vec3(r.x, r.y - radius, r.z)
     if semi_axes is None:
         return ball
+    if semi_axes.x == semi_axes.y and semi_axes.y == semi_axes.z:
+        return ball
     # With S the semi-axes and n = Rᵀ N, the lowest point is at -R S e, e = S n / |S n|; where a disc is level, every e in it is one.
     stretched = Vec3(semi_axes.x * R.row2.x, semi_axes.y * R.row2.y, semi_axes.z * R.row2.z)
     length = math.sqrt(dot(stretched, stretched))
-    e = select(length > 0.0, stretched / select(length > 0.0, length, 1.0), Vec3(1.0, 0.0, 0.0))
+    e = stretched / length if length > 0.0 else Vec3(1.0, 0.0, 0.0)
     cosine, sine = PLACES[place]
     offset = R @ Vec3(semi_axes.x * (cosine * e.x + sine * e.z), semi_axes.y * e.y, semi_axes.z * (cosine * e.z - sine * e.x))
-    is_ball = (semi_axes.x == semi_axes.y) & (semi_axes.y == semi_axes.z)
-    return select(is_ball, ball, r - offset)
+    return r - offset

@@ -22,7 +22,7 @@ from numba import njit
 from numba.core import config as numba_config
 from numpy.typing import NDArray
 
-from dropspin.reference_impl import lanes, sources
+from dropspin.reference_impl import sources
 from dropspin.reference_impl.methods import COLLIDE, CORRECTIONS, LAWS, ROTATIONS, Methods
 from dropspin.reference_impl.parameters import (
     STEP_SIZE,
@@ -62,11 +62,8 @@ class Parts:
 
 
 @cache
-def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[..., int]:
-    """The loop that records each `every`-th state of the bodies of some blocks, and counts the steps whose contact did not converge.
-
-    Its arrays hold `width` bodies in each block, as `blocks` arranges them: one (a number is then a float), or `lanes.WIDTH`.
-    """
+def recording_kernel(methods: Methods, parts: Parts) -> Callable[..., int]:
+    """The loop that records each `every`-th state of some bodies, and counts the steps whose contact did not converge."""
     gravity_of = read_gravity if parts.gravity else read_nothing
     damping_of = read_damping if parts.damping else read_nothing
     floor_of = (read_floor_with_edges if parts.edges else read_floor) if parts.floor else read_nothing
@@ -77,85 +74,67 @@ def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[...
     correction = CORRECTIONS[methods.correction] if touches else None
     correct = None if correction is None else correction.correct
     walls_of, wall_count = _walls_of if parts.walls else _no_walls, parts.walls
-    load, rows_of, record = (_load, _rows_of, _record) if width == 1 else (lanes.load, lanes.rows_of, lanes.record)
-    forces_of = rows_of if parts.forces else _no_rows
-    many_points_of = _columns_of if parts.many_points else _no_rows
+    forces_of = _of_body if parts.forces else _none_of_body
+    many_points_of = _of_body if parts.many_points else _none_of_body
     semi_axes_of, has_rims = read_semi_axes if parts.ellipsoids else read_nothing, parts.rims
 
     def fill(recorded, states, columns, points, many_points, forces, every, first, last):
         unsolved = 0
-        for block in range(first, last):
-            own = min(block, columns.shape[0] - 1)
-            body = read_body(load, columns, rows_of(points, block), own, semi_axes_of, has_rims, many_points_of(many_points, block))
-            dt = load(columns, own, STEP_SIZE)
-            gravity = gravity_of(load, columns, own)
-            damping = damping_of(load, columns, own)
-            floor = floor_of(load, columns, own)
-            walls = walls_of(load, columns, own, wall_count)
-            on_vertices = forces_of(forces, block)
-            x = read_vector(load, states, block, 0)
-            q = read_quaternion(load, states, block, 3)
-            v = read_vector(load, states, block, 7)
-            w = read_vector(load, states, block, 10)
-            record(recorded, block, 0, x, q, v, w)
+        for number in range(first, last):
+            numbers = columns[min(number, columns.shape[0] - 1)]
+            body = read_body(numbers, _of_body(points, number), semi_axes_of(numbers), has_rims, many_points_of(many_points, number))
+            dt = float(numbers[STEP_SIZE])
+            gravity = gravity_of(numbers)
+            damping = damping_of(numbers)
+            floor = floor_of(numbers)
+            walls = walls_of(numbers, wall_count)
+            on_vertices = forces_of(forces, number)
+            start = states[number]
+            x = read_vector(start, 0)
+            q = read_quaternion(start, 3)
+            v = read_vector(start, 7)
+            w = read_vector(start, 10)
+            _record(recorded[number, 0], x, q, v, w)
             for row in range(1, recorded.shape[1]):
                 for _ in range(every):
                     x, q, v, w, converged = advance(
                         x, q, v, w, dt, body, gravity, on_vertices, damping, floor, walls, turn, collide, law, correct
                     )
                     unsolved += not converged
-                record(recorded, block, row, x, q, v, w)
+                _record(recorded[number, row], x, q, v, w)
         return unsolved
 
     return compile_cached(fill)
 
 
 @compiled
-def _walls_of(load, columns, block, count):
-    """The walls of a block, which are read where they are used: the registers do not hold them."""
-    return load, columns, block, count
+def _walls_of(numbers, count):
+    """The walls of a body, which are read where they are used: the registers do not hold them."""
+    return numbers, count
 
 
 @compiled
-def _no_walls(load, columns, block, count):
-    return None
-
-
-# A block of one body, whose numbers are floats.
-
-
-@compiled
-def _load(array, block, column):
-    return float(array[block, column])
-
-
-@compiled
-def _rows_of(array, block):
-    return array[min(block, array.shape[0] - 1)].T
-
-
-@compiled
-def _columns_of(array, block):
-    return array[min(block, array.shape[0] - 1)]
-
-
-@compiled
-def _no_rows(array, block):
+def _no_walls(numbers, count):
     return None
 
 
 @compiled
-def _record(recorded, block, row, x, q, v, w):
-    out = recorded[block, row]
+def _of_body(array, number):
+    """The part of an array that belongs to a body; the last one may be shared."""
+    return array[min(number, array.shape[0] - 1)]
+
+
+@compiled
+def _none_of_body(array, number):
+    return None
+
+
+@compiled
+def _record(out, x, q, v, w):
     out[0], out[1], out[2] = x.x, x.y, x.z
     out[3], out[4], out[5], out[6] = q.x, q.y, q.z, q.w
     out[7], out[8], out[9] = v.x, v.y, v.z
     out[10], out[11], out[12] = w.x, w.y, w.z
-
-
-def blocks(array: NDArray[Any], width: int) -> NDArray[Any]:
-    """An array of shape (B, …), arranged for a kernel of the given width; each column of (n, 3) rows of one body is contiguous."""
-    return np.ascontiguousarray(np.swapaxes(array, 1, -1)) if width == 1 else lanes.side_by_side(array)
 
 
 def compile_cached(function: Callable[..., Any], *other_sources: Path) -> Callable[..., Any]:

@@ -16,7 +16,6 @@ Leaf = ModuleType
 """A module with one method and its properties:
 
 - `ORDER`: its order of accuracy in dt, infinite if it is exact, None if it claims none.
-- `RUNS_IN_LANES`: whether it can process many bodies in the lanes of a register.
 - `DISCRETISATION`, of a rotation: the name of the discretisation, which engines of the same discretisation share.
 - `ANY_FRICTION`, of a law: whether it takes a coefficient of friction between 0 and infinity.
 """
@@ -69,11 +68,6 @@ class Methods:
             raise ValueError(f"contact {self.contact!r} works with the laws {laws}, not with {self.law!r}")
 
     @property
-    def runs_in_lanes(self) -> bool:
-        """Whether bodies can be processed in the lanes of a register."""
-        return all(leaf.RUNS_IN_LANES for leaf in (ROTATIONS[self.rotation], *self._floor_leaves))
-
-    @property
     def takes_any_friction(self) -> bool:
         """Whether the law takes a coefficient of friction between 0 and infinity."""
         return bool(LAWS[self.law].ANY_FRICTION)
@@ -83,16 +77,11 @@ class Methods:
         orders: list[float | None] = [ROTATIONS[self.rotation].ORDER]
         orders += [TRANSLATION_ORDER] if gravity else []
         orders += [DAMPING_ORDER] if damping else []
-        orders += [leaf.ORDER for leaf in self._floor_leaves] if floor else []
+        leaves = LAWS[self.law], CONTACTS[self.contact], CORRECTIONS[self.correction]
+        orders += [leaf.ORDER for leaf in leaves if leaf is not None] if floor else []
         claimed = [order for order in orders if order is not None]
         return min(claimed) if len(claimed) == len(orders) else None
 
     def discretisation(self, *, tumbles: bool) -> str:
         """Name of the discretisation of a flight: that of the rotation, or that of the translation if the rotation has no effect."""
         return str(ROTATIONS[self.rotation].DISCRETISATION if tumbles else TRANSLATION_DISCRETISATION)
-
-    @property
-    def _floor_leaves(self) -> list[Leaf]:
-        """The methods that are used only with a floor."""
-        correction = CORRECTIONS[self.correction]
-        return [LAWS[self.law], CONTACTS[self.contact], *([correction] if correction else [])]

@@ -243,100 +243,94 @@ def _frames(normals: Array) -> Array:
     return np.stack([a, -x, b, *normals.T, sign * b, -sign * z, sign * c], axis=1)
 
 
-# Reading, by a `load(columns, block, column)` that returns a number, or the lanes of many bodies.
+# Reading from the columns of one body.
 
 
 @compiled
-def read_body(load, columns, points, block, semi_axes_of, has_rims, many_points):
-    """The body, or the bodies, of a block."""
+def read_body(columns, points, semi_axes, has_rims, many_points):
+    """The body."""
     return KernelBody(
-        load(columns, block, MASS),
-        _read_matrix(load, columns, block, INERTIA),
-        _read_matrix(load, columns, block, INVERSE_INERTIA),
-        read_vector(load, columns, block, MOMENTS),
-        read_quaternion(load, columns, block, AXES),
+        float(columns[MASS]),
+        _read_matrix(columns, INERTIA),
+        _read_matrix(columns, INVERSE_INERTIA),
+        read_vector(columns, MOMENTS),
+        read_quaternion(columns, AXES),
         points,
-        load(columns, block, SEMI_AXES),
-        load(columns, block, REACH),
-        semi_axes_of(load, columns, block),
+        float(columns[SEMI_AXES]),
+        float(columns[REACH]),
+        semi_axes,
         has_rims,
         many_points,
     )
 
 
 @compiled
-def read_semi_axes(load, columns, block):
+def read_semi_axes(columns):
     """The semi-axes about each vertex [m]."""
-    return read_vector(load, columns, block, SEMI_AXES)
+    return read_vector(columns, SEMI_AXES)
 
 
 @compiled
-def read_gravity(load, columns, block):
+def read_gravity(columns):
     """Gravity [m/s²]."""
-    return read_vector(load, columns, block, GRAVITY)
+    return read_vector(columns, GRAVITY)
 
 
 @compiled
-def read_damping(load, columns, block):
+def read_damping(columns):
     """Algorithm 1's damping factors."""
-    return KernelDamping(load(columns, block, DAMPING), load(columns, block, DAMPING + 1))
+    return KernelDamping(float(columns[DAMPING]), float(columns[DAMPING + 1]))
 
 
 @compiled
-def read_floor(load, columns, block):
+def read_floor(columns):
     """A floor without an end."""
-    return _read_surface(load, columns, block, FLOOR)
+    return _read_surface(columns, FLOOR)
 
 
 @compiled
-def read_floor_with_edges(load, columns, block):
+def read_floor_with_edges(columns):
     """A floor that ends."""
-    endless = _read_surface(load, columns, block, FLOOR)
-    half_extents = (load(columns, block, EDGES), load(columns, block, EDGES + 1))
-    return Floor(endless.restitution, endless.friction, endless.rest_speed, half_extents, load(columns, block, EDGES + 2))
+    endless = _read_surface(columns, FLOOR)
+    half_extents = (float(columns[EDGES]), float(columns[EDGES + 1]))
+    return Floor(endless.restitution, endless.friction, endless.rest_speed, half_extents, float(columns[EDGES + 2]))
 
 
 @compiled
-def read_wall(load, columns, block, number):
+def read_wall(columns, number):
     """One of the walls."""
     first = WALLS + number * WALL_COLUMNS
     return KernelWall(
-        _read_matrix(load, columns, block, first + 3),
-        read_quaternion(load, columns, block, first + 12),
-        load(columns, block, first + 16),
-        _read_surface(load, columns, block, first),
+        _read_matrix(columns, first + 3),
+        read_quaternion(columns, first + 12),
+        float(columns[first + 16]),
+        _read_surface(columns, first),
     )
 
 
 @compiled
-def _read_surface(load, columns, block, first):
-    return Floor(load(columns, block, first), load(columns, block, first + 1), load(columns, block, first + 2), None, None)
+def _read_surface(columns, first):
+    return Floor(float(columns[first]), float(columns[first + 1]), float(columns[first + 2]), None, None)
 
 
 @compiled
-def read_vector(load, columns, block, first):
+def read_vector(columns, first):
     """The vector in three columns."""
-    return Vec3(load(columns, block, first), load(columns, block, first + 1), load(columns, block, first + 2))
+    return Vec3(float(columns[first]), float(columns[first + 1]), float(columns[first + 2]))
 
 
 @compiled
-def read_quaternion(load, columns, block, first):
+def read_quaternion(columns, first):
     """The quaternion in four columns."""
-    return Quat(
-        load(columns, block, first), load(columns, block, first + 1), load(columns, block, first + 2), load(columns, block, first + 3)
-    )
+    return Quat(float(columns[first]), float(columns[first + 1]), float(columns[first + 2]), float(columns[first + 3]))
 
 
 @compiled
-def _read_matrix(load, columns, block, first):
-    return Mat3(
-        read_vector(load, columns, block, first),
-        read_vector(load, columns, block, first + 3),
-        read_vector(load, columns, block, first + 6),
-    )
+def _read_matrix(columns, first):
+    return Mat3(read_vector(columns, first), read_vector(columns, first + 3), read_vector(columns, first + 6))
 
 
 @compiled
-def read_nothing(load, columns, block):
+def read_nothing(columns):
     """A value for a part that the world does not have."""
     return None

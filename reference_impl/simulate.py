@@ -4,15 +4,13 @@ import math
 import operator
 import warnings
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dropspin.reference_impl import lanes
 from dropspin.reference_impl.body import Body, World
 from dropspin.reference_impl.floor_plane import BLOCK
-from dropspin.reference_impl.kernels import Parts, blocks, config, recording_kernel
+from dropspin.reference_impl.kernels import Parts, recording_kernel
 from dropspin.reference_impl.methods import Methods
 from dropspin.reference_impl.parameters import SEMI_AXES, checked, ensemble_size, frictions, is_finite, pack
 from dropspin.reference_impl.state import ORIENTATION, SPIN
@@ -115,10 +113,14 @@ class Simulator:
         for friction in frictions(world):
             _assert_law_fits(self._methods, friction)
         self._world = world
-        semi_axes = self._parameters.columns[:, SEMI_AXES : SEMI_AXES + 3]
+        columns, points, _ = self._parameters
+        semi_axes = columns[:, SEMI_AXES : SEMI_AXES + 3]
         self._surface = bool(np.ptp(semi_axes, axis=1).any()), bool(((semi_axes[:, 1] == 0.0) & semi_axes.any(axis=1)).any())
         self._can_fall_without_turning = _can_fall_without_turning(body, world)
-        self._packed: dict[int, list[NDArray[np.floating[Any]] | None]] = {}
+        self._many_points = None
+        if points.shape[1] >= BLOCK and not semi_axes.any():
+            reach = np.sqrt(np.max(np.sum(points**2, axis=2), axis=1))[:, None, None]
+            self._many_points = np.ascontiguousarray(np.swapaxes(points / reach, 1, 2), dtype=np.float32)
         self.unsolved_steps = 0
 
     def run(self, states: ArrayLike, steps: int, every: int = 1, forces: ArrayLike | None = None, threads: int | None = None) -> Array:
@@ -132,23 +134,16 @@ class Simulator:
         size = ensemble_size(given)
         starts = _with_unit_orientation(starts)
         if len(starts) < size:
-            starts = np.broadcast_to(starts, (size, 13))
+            starts = np.tile(starts, (size, 1))
         turning = on_vertices is not None or not (self._can_fall_without_turning and _is_without_spin(starts, self._world))
         world = self._world
         modelled = (world.gravity is not None, on_vertices is not None, world.damping is not None, world.floor is not None, turning)
         edges = world.floor is not None and not (world.floor.half_extents is None and world.floor.thickness is None)
-        width = lanes.WIDTH if size > 1 and self._methods.runs_in_lanes and not config.DISABLE_JIT else 1
-        many_points = width == 1 and points.shape[1] >= BLOCK and not columns[:, SEMI_AXES : SEMI_AXES + 3].any()
-        parts = Parts(*modelled, *self._surface, edges, len(world.walls), many_points)
+        parts = Parts(*modelled, *self._surface, edges, len(world.walls), self._many_points is not None)
         recorded = np.empty((size, 1 + steps // every, 13))
-        if width not in self._packed:
-            reach = np.sqrt(np.max(np.sum(points**2, axis=2), axis=1))[:, None, None]
-            units = blocks((points / reach).astype(np.float32), width) if many_points else None
-            self._packed[width] = [blocks(columns, width), blocks(points, width), units]
-        packed = (blocks(starts, width), *self._packed[width], None if on_vertices is None else blocks(on_vertices, width))
-        kernel = recording_kernel(self._methods, parts, width)
-        work = steps * width
-        self.unsolved_steps += share_out(partial(kernel, recorded, *packed, every), -(-size // width), work, threads)
+        kernel = recording_kernel(self._methods, parts)
+        fill = partial(kernel, recorded, starts, columns, points, self._many_points, on_vertices, every)
+        self.unsolved_steps += share_out(fill, size, steps, threads)
         is_alone = not is_ensemble and np.ndim(states) == 1 and (forces is None or np.ndim(forces) == 2)
         return recorded[0] if is_alone else recorded
 

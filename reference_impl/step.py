@@ -7,7 +7,7 @@ Source: H. Wang, Rigid Body Dynamics (lecture note), Algorithm 1.
 """
 
 from dropspin.reference_impl.quaternion import rotation_matrix
-from dropspin.reference_impl.vectors import Vec3, any_, compiled, cross, row, transpose
+from dropspin.reference_impl.vectors import Vec3, compiled, cross, row, transpose
 from dropspin.reference_impl.walls import collide_with_walls, correct_at_walls
 
 TRANSLATION_ORDER = 1.0
@@ -27,7 +27,7 @@ def advance(x, q, v, w, dt, body, gravity, forces, damping, floor, walls, turn, 
         v = damping.linear * v
         w = damping.angular * w
     if floor is not None:
-        if any_(x.y < body.reach):  # otherwise no vertex can be below the floor
+        if x.y < body.reach:  # otherwise no vertex can be below the floor
             v, w, converged = collide(x, q, v, w, body, floor, law)
     if walls is not None:
         v, w, converged = collide_with_walls(x, q, v, w, body, walls, collide, law, converged)

@@ -133,19 +133,6 @@ class Mat3(NamedTuple):
         return _apply(self, other) if isinstance(other, Vec3) else _compose(self, other)
 
 
-def select(mask, a, b):
-    """`a` where the mask is true, else `b`; numbers or vectors.
-
-    Kernels branch with `select` and `any_`, which evaluate both sides, so that the same source is valid for one body and for many in lanes.
-    """
-    return a if mask else b
-
-
-def any_(mask):
-    """Whether the mask is true for any body."""
-    return mask
-
-
 @compiled
 def row(array, i):
     """Row i of an (n, 3) array, as plain floats: NumPy scalars are slow and would take precedence over the operators above."""
@@ -189,13 +176,9 @@ def solve(m, b):
     return (1.0 / dot(m.row1, c1)) * (b.x * c1 + b.y * c2 + b.z * c3)
 
 
-class NumberLike(types.Type):
-    """A numba type that compiled code accepts in place of a float."""
-
-
 def _is(numba_type: Any, kind: type) -> bool:
     if kind is float:
-        return isinstance(numba_type, types.Number | NumberLike)
+        return isinstance(numba_type, types.Number)
     return isinstance(numba_type, types.NamedTuple | types.NamedUniTuple) and numba_type.instance_class is kind
 
 
@@ -211,22 +194,6 @@ def _register_operator(symbol: Callable[..., Any], source: Callable[..., Any], *
         @overload(symbol, strict=False)
         def binary(a, b):
             return source if _is(a, kinds[0]) and _is(b, kinds[1]) else None
-
-
-def _select3(mask: bool, a: "Vec3", b: "Vec3") -> "Vec3":
-    return Vec3(select(mask, a.x, b.x), select(mask, a.y, b.y), select(mask, a.z, b.z))
-
-
-@overload(select, strict=False)
-def _select(mask, a, b):
-    if isinstance(mask, types.Boolean):
-        return lambda mask, a, b: a if mask else b
-    return _select3 if _is(a, Vec3) else None
-
-
-@overload(any_)
-def _any(mask):
-    return (lambda mask: mask) if isinstance(mask, types.Boolean) else None
 
 
 for _symbol, _source, *_kinds in (

@@ -118,7 +118,7 @@ class WangSimulation(Simulation):
 
 
 class WangBatch(BatchSimulation):
-    """Simulations of many scenes by the reference implementation, in lanes and threads."""
+    """Simulations of many scenes by the reference implementation, in threads."""
 
     def __init__(self, members: Sequence[Scenario], dt: float, methods: reference_impl.Methods) -> None:
         self.velocity_lag = 0.5 * dt

@@ -10,10 +10,9 @@ Source: H. Wang, Rigid Body Dynamics, Algorithm 2, eq 10, 12 and section 3.2.
 from dropspin.reference_impl.contacts.response import impulse_response
 from dropspin.reference_impl.floor_plane import along_normal, block_count, block_range, contact_offset, is_below
 from dropspin.reference_impl.quaternion import rotation_matrix
-from dropspin.reference_impl.vectors import Vec3, any_, compiled, cross, select, transpose
+from dropspin.reference_impl.vectors import Vec3, compiled, cross, transpose
 
 ORDER = None
-RUNS_IN_LANES = True
 
 
 @compiled
@@ -21,9 +20,8 @@ def collide(x, q, v, w, body, floor, law):
     """Algorithm 2: the velocities (v, ω) after the floor has acted, and True, because no iteration can fail."""
     R = rotation_matrix(q)
     r, hit = contact_point(R, x, v, w, body, floor)
-    if any_(hit):
-        v_after, w_after = apply_impulse(r, R, v, w, body, floor, law)
-        v, w = select(hit, v_after, v), select(hit, w_after, w)
+    if hit:
+        v, w = apply_impulse(r, R, v, w, body, floor, law)
     return v, w, True
 
 
@@ -34,20 +32,18 @@ def contact_point(R, x, v, w, body, floor):
     count = 0.0
     for block in range(block_count(body.many_points)):
         for i in range(*block_range(x, R, body, body.many_points, block)):
-            below = is_below(x, contact_offset(R, body, i), floor)
-            if any_(below):
-                r = contact_offset(R, body, i)
-                descends = along_normal(v + cross(w, r)) < 0.0
-                total = select(below & descends, total + r, total)
-                count = select(below & descends, count + 1.0, count)
-    return total / select(count > 0.0, count, 1.0), count > 0.0
+            r = contact_offset(R, body, i)
+            if is_below(x, r, floor) and along_normal(v + cross(w, r)) < 0.0:
+                total = total + r
+                count += 1.0
+    return total / max(count, 1.0), count > 0.0
 
 
 @compiled
 def apply_impulse(r, R, v, w, body, floor, law):
     """Eq 7, 12 and 15: the velocities (v, ω) after one impulse j at the offset r from the centre of mass."""
     v_contact = v + cross(w, r)
-    mu = select(abs(along_normal(v_contact)) < floor.rest_speed, 0.0, floor.restitution)
+    mu = 0.0 if abs(along_normal(v_contact)) < floor.rest_speed else floor.restitution
     I_inverse = R @ body.inverse_inertia @ transpose(R)  # eq 7
     j = law(impulse_response(r, I_inverse, body.mass), v_contact, mu, floor.friction)
     return v + (1.0 / body.mass) * j, w + I_inverse @ cross(r, j)  # eq 12

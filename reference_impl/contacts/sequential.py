@@ -7,7 +7,6 @@ Keeps: no submerged vertex approaches faster than `TOLERANCE` after a step that 
 energy: a vertex that was separating does not limit the restitution of its neighbours.
 Stops: the number of sweeps is limited, and a step that did not converge is reported. With friction of about 1 and above at several vertices
 a solution need not exist.
-Lanes: none. The number of sweeps differs from body to body, so the bodies of an ensemble run one after the other.
 Cost: about ten to a few hundred sweeps over the vertices per step.
 Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988); M. Jean, The non-smooth contact dynamics
 method, CMAME 177 (1999).
@@ -23,7 +22,6 @@ from dropspin.reference_impl.quaternion import rotation_matrix
 from dropspin.reference_impl.vectors import Vec3, compiled, cross, transpose
 
 ORDER = None
-RUNS_IN_LANES = False
 
 TOLERANCE = 1e-10  # m/s; converged where no vertex's velocity changed by more in a sweep
 MAX_SWEEPS = 2000

@@ -11,10 +11,9 @@ Source: the simplest stabilisation of J. Baumgarte, CMAME 1 (1972), and E. Catto
 
 from dropspin.reference_impl.floor_plane import N, along_normal, contact_count, contact_offset, is_below
 from dropspin.reference_impl.quaternion import rotation_matrix
-from dropspin.reference_impl.vectors import any_, compiled, select
+from dropspin.reference_impl.vectors import compiled
 
 ORDER = None
-RUNS_IN_LANES = True
 
 PENETRATION_LEFT = 1e-7  # m
 
@@ -22,12 +21,12 @@ PENETRATION_LEFT = 1e-7  # m
 @compiled
 def correct(x, q, body, floor):
     """The position after lifting the lowest vertex to `PENETRATION_LEFT` below the floor, if it was lower."""
-    near = x.y < body.reach
-    if not any_(near):
+    if not x.y < body.reach:
         return x
     R = rotation_matrix(q)
     lowest = 0.0
     for i in range(contact_count(body)):
         r = contact_offset(R, body, i)
-        lowest = select(is_below(x, r, floor), min(lowest, x.y + along_normal(r)), lowest)
-    return select(near, x + max(-lowest - PENETRATION_LEFT, 0.0) * N, x)
+        if is_below(x, r, floor):
+            lowest = min(lowest, x.y + along_normal(r))
+    return x + max(-lowest - PENETRATION_LEFT, 0.0) * N

@@ -14,19 +14,19 @@ import math
 
 from dropspin.reference_impl.floor_plane import N
 from dropspin.reference_impl.laws import normal
-from dropspin.reference_impl.vectors import compiled, dot, select, solve
+from dropspin.reference_impl.vectors import compiled, dot, solve
 
 ORDER = math.inf
-RUNS_IN_LANES = True
 ANY_FRICTION = False
 
 
 @compiled
 def impulse(K, u, mu, friction):
     """The impulse j = K⁻¹ (-u - µ' u_n N) with µ' = min(µ, √(u·K⁻¹u / (u_n² N·K⁻¹N)))."""
+    if not friction > 0.0:
+        return normal.impulse(K, u, mu, friction)
     v_normal = dot(u, N)
     before = dot(u, solve(K, u))
     at_one = v_normal * v_normal * dot(N, solve(K, N))
-    most = math.sqrt(max(before, 0.0) / select(at_one > 0.0, at_one, 1.0))
-    sticks = solve(K, -u - min(mu, most) * v_normal * N)
-    return select(friction > 0.0, sticks, normal.impulse(K, u, mu, friction))
+    most = math.sqrt(max(before, 0.0) / (at_one if at_one > 0.0 else 1.0))
+    return solve(K, -u - min(mu, most) * v_normal * N)

@@ -18,29 +18,30 @@ import math
 
 from dropspin.reference_impl.floor_plane import N
 from dropspin.reference_impl.laws import normal, note
-from dropspin.reference_impl.vectors import compiled, dot, select
+from dropspin.reference_impl.vectors import compiled, dot
 
 ORDER = math.inf
-RUNS_IN_LANES = True
 ANY_FRICTION = True
 
 
 @compiled
 def impulse(K, u, mu, friction):
     """The impulse j, with |j_t| <= f j_n where it slips."""
+    if not friction > 0.0:
+        return normal.impulse(K, u, mu, friction)
     v_normal = dot(u, N)
     stick = note.impulse(K, u, mu, friction)
-    holds = (_along_floor(stick) <= friction * stick.y) | (friction == math.inf)
     driven = K @ N
-    slides = _along_floor(u) > 0.0
-    sliding = select(slides, u - v_normal * N, driven - driven.y * N)
+    sliding = u - v_normal * N if _along_floor(u) > 0.0 else driven - driven.y * N
     speed = _along_floor(sliding)
-    direction = N - (friction / select(speed > 0.0, speed, 1.0)) * sliding
+    if _along_floor(stick) <= friction * stick.y or friction == math.inf or speed == 0.0:
+        return stick
+    direction = N - (friction / speed) * sliding
     response = dot(N, K @ direction)
-    slip = -(1.0 + mu) * v_normal / select(response > 0.0, response, 1.0) * direction
-    goes_on = (response > 0.0) & (dot(u + K @ slip, sliding) >= 0.0)
-    grips = select(holds | (speed == 0.0), stick, select(goes_on, slip, stick))
-    return select(friction > 0.0, grips, normal.impulse(K, u, mu, friction))
+    if not response > 0.0:
+        return stick
+    slip = -(1.0 + mu) * v_normal / response * direction
+    return slip if dot(u + K @ slip, sliding) >= 0.0 else stick
 
 
 @compiled

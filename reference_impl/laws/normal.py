@@ -13,7 +13,6 @@ from dropspin.reference_impl.floor_plane import N
 from dropspin.reference_impl.vectors import compiled, dot
 
 ORDER = math.inf
-RUNS_IN_LANES = True
 ANY_FRICTION = True
 
 

@@ -13,10 +13,9 @@ Source: H. Wang, Rigid Body Dynamics, eq 11 to 17.
 import math
 
 from dropspin.reference_impl.floor_plane import N, along_normal
-from dropspin.reference_impl.vectors import compiled, select, solve
+from dropspin.reference_impl.vectors import compiled, solve
 
 ORDER = math.inf
-RUNS_IN_LANES = True
 ANY_FRICTION = False
 
 
@@ -26,4 +25,4 @@ def impulse(K, u, mu, friction):
     v_normal = along_normal(u)
     sticks = -u - mu * v_normal * N  # eq 17
     slides = -(1.0 + mu) * v_normal * N  # eq 11
-    return solve(K, select(friction > 0.0, sticks, slides))
+    return solve(K, sticks if friction > 0.0 else slides)

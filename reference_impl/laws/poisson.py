@@ -14,16 +14,17 @@ import math
 
 from dropspin.reference_impl.floor_plane import N
 from dropspin.reference_impl.laws import normal
-from dropspin.reference_impl.vectors import compiled, dot, select, solve
+from dropspin.reference_impl.vectors import compiled, dot, solve
 
 ORDER = math.inf
-RUNS_IN_LANES = True
 ANY_FRICTION = False
 
 
 @compiled
 def impulse(K, u, mu, friction):
     """The impulse j = K⁻¹ (s N - u)."""
+    if not friction > 0.0:
+        return normal.impulse(K, u, mu, friction)
     compression = solve(K, u)
     s = mu * max(-dot(N, compression), 0.0) / dot(N, solve(K, N))
-    return select(friction > 0.0, solve(K, s * N - u), normal.impulse(K, u, mu, friction))
+    return solve(K, s * N - u)

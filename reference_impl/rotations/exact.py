@@ -6,8 +6,6 @@
 Order: infinite; each step is exact to the rounding of its restart.
 Keeps: energy and L.
 Valid for: any |ω| dt.
-Lanes: none. The branches and iterations of the elliptic functions differ between bodies, so the bodies of an ensemble run one after the
-other.
 Cost: one set of elliptic functions, two integrals R_F and two to four R_J per step, by far the most of all rotations.
 Source: L. D. Landau & E. M. Lifshitz, Mechanics, section 37; E. T. Whittaker, Analytical Dynamics, section 69; Carlson's integrals.
 """
@@ -19,7 +17,6 @@ from dropspin.reference_impl.quaternion import conjugate, from_matrix, normalise
 from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, compiled, cross, dot, transpose
 
 ORDER = math.inf
-RUNS_IN_LANES = False
 DISCRETISATION = "exact"
 
 PARALLEL = 1e-15

@@ -15,7 +15,6 @@ from dropspin.reference_impl.rotations import note
 from dropspin.reference_impl.vectors import compiled, cross
 
 ORDER = 1.0
-RUNS_IN_LANES = True
 DISCRETISATION = "semi-implicit Euler with the gyroscopic term explicit"
 
 

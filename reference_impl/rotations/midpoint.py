@@ -10,10 +10,9 @@ Source: E. Hairer, C. Lubich & G. Wanner, Geometric Numerical Integration (2006)
 """
 
 from dropspin.reference_impl.quaternion import normalise, product, to_body, to_world
-from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, any_, compiled, cross, cross_matrix, dot, select, solve
+from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, compiled, cross, cross_matrix, dot, solve
 
 ORDER = 2.0
-RUNS_IN_LANES = True
 DISCRETISATION = "midpoint"
 
 MAX_NEWTON_STEPS = 30
@@ -26,16 +25,14 @@ def turn(q, w, dt, body):
     start = body.inertia @ to_body(q, w)
     m = start
     small = 1e-32 * dot(start, start)
-    moving = True
     for _ in range(MAX_NEWTON_STEPS):
         middle = 0.5 * (start + m)
         spin = body.inverse_inertia @ middle
         residual = m - start - dt * cross(middle, spin)
         J = IDENTITY - (0.5 * dt) * (cross_matrix(middle) @ body.inverse_inertia - cross_matrix(spin))
         correction = solve(J, residual)
-        m = select(moving, m - correction, m)
-        moving = moving & (dot(correction, correction) > small)
-        if not any_(moving):
+        m = m - correction
+        if not dot(correction, correction) > small:
             break
     half = (0.5 * dt) * (body.inverse_inertia @ (0.5 * (start + m)))
     q = normalise(product(q, Quat(half.x, half.y, half.z, 1.0)))

@@ -14,7 +14,6 @@ from dropspin.reference_impl.quaternion import normalise, product
 from dropspin.reference_impl.vectors import Quat, compiled
 
 ORDER = None
-RUNS_IN_LANES = True
 DISCRETISATION = "note"
 
 

@@ -13,7 +13,6 @@ from dropspin.reference_impl.quaternion import normalise, product, to_body, to_w
 from dropspin.reference_impl.vectors import Quat, compiled, cross
 
 ORDER = 4.0
-RUNS_IN_LANES = True
 DISCRETISATION = "rk4"
 
 

@@ -14,10 +14,9 @@ body; M. Suzuki, Phys. Lett. A 146 (1990), for the composition.
 import math
 
 from dropspin.reference_impl.quaternion import conjugate, normalise, product, to_body, to_world
-from dropspin.reference_impl.vectors import Quat, Vec3, compiled, dot, select
+from dropspin.reference_impl.vectors import Quat, Vec3, compiled, dot
 
 ORDER = 4.0
-RUNS_IN_LANES = True
 DISCRETISATION = "symmetric-top"
 
 OUTER_STEP = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
@@ -56,7 +55,7 @@ def _symmetric_top(q, m, h, I):
     length = math.sqrt(dot(m, m))
     half = 0.5 * h * length / I.x
     # sin(half)/length, which is h/(2 I₁) where the body is at rest
-    share = math.sin(half) / select(length > 0.0, length, 1.0)
+    share = math.sin(half) / (length if length > 0.0 else 1.0)
     angle = h * m.z * (1.0 / I.z - 1.0 / I.x)
     c, s = math.cos(angle), math.sin(angle)
     about_momentum = Quat(share * m.x, share * m.y, share * m.z, math.cos(half))

@@ -197,7 +197,7 @@ def test_fast_small_body_stays_below_the_floor():
 def test_points_of_a_rim_divide_it_into_three_from_the_lowest():
     """Of a cylinder at random orientations: on the rim, 120° apart, the first as low as the disc is; of a level disc too."""
     packed = pack(Body(1.0, np.eye(3), np.array([[0.0, -0.3, 0.0], [0.0, 0.3, 0.0]]), (0.2, 0.0, 0.2)), World(), 1.0)
-    body = read_body(lambda columns, _, column: float(columns[0, column]), packed.columns, packed.points[0], 0, read_semi_axes, True, None)
+    body = read_body(packed.columns[0], packed.points[0], read_semi_axes(packed.columns[0]), True, None)
     assert contact_count(body) == 6
     for q in (np.array([0.0, 0.0, 0.0, 1.0]), *np.random.default_rng(2).normal(size=(5, 4))):
         R = rotation_matrix(Quat(*(q / np.linalg.norm(q)).tolist()))

@@ -12,7 +12,7 @@ from dropspin.reference_impl.body import Floor, World
 from dropspin.reference_impl.contacts.mean import apply_impulse
 from dropspin.reference_impl.contacts.response import impulse_response
 from dropspin.reference_impl.laws import note
-from dropspin.reference_impl.parameters import pack, read_body, read_nothing
+from dropspin.reference_impl.parameters import pack, read_body
 from dropspin.reference_impl.quaternion import normalise, product, rotation_matrix
 from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, cross, cross_matrix, dot, solve
 
@@ -98,7 +98,7 @@ def box_in_the_air(q):
     mass = 1.7
     inertia = reference_impl.solid_box_inertia(mass, half)
     packed = pack(reference_impl.Body(mass, inertia, np.array([half])), World(), 1.0)
-    body = read_body(lambda columns, _, column: float(columns[0, column]), packed.columns, packed.points[0], 0, read_nothing, False, None)
+    body = read_body(packed.columns[0], packed.points[0], None, False, None)
     R = Rotation.from_quat(q).as_matrix()
     return body, R, R @ np.linalg.inv(inertia) @ R.T
 

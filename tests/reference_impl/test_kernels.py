@@ -1,4 +1,4 @@
-"""Kernels have the same bits interpreted, compiled, in lanes and in threads; and the cache on disk never serves stale kernels."""
+"""Kernels have the same bits interpreted, compiled, in ensembles and in threads; and the cache on disk never serves stale kernels."""
 
 import json
 import os
@@ -20,7 +20,7 @@ from dropspin.reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIO
 from dropspin.reference_impl.state import ORIENTATION
 
 PACKAGE = Path(reference_impl.__file__).parent
-KINDS, BODIES = 5, 19  # 19 bodies of 5 kinds: more than fill the lanes, and not a multiple of their number
+KINDS, BODIES = 5, 19
 ALL = np.arange(BODIES) % KINDS
 STEPS = 100
 
@@ -87,8 +87,8 @@ def test_interpreted_compiled_and_ensemble_results_agree_to_the_last_bit(choices
     assert len(results) == len(choices)  # no two choices are the same method
 
 
-def test_vertices_in_blocks_collide_as_one_after_the_other():
-    """With many vertices, in no order, to the last bit; those of an ensemble are not in blocks."""
+def test_vertices_in_blocks_collide_as_one_after_the_other(monkeypatch):
+    """With many vertices, in no order, to the last bit."""
     rng = np.random.default_rng(4)
     points = rng.normal(size=(3 * BLOCK + 7, 3))
     points *= np.array([0.1, 0.2, 0.3]) / np.linalg.norm(points, axis=1)[:, None]
@@ -97,6 +97,7 @@ def test_vertices_in_blocks_collide_as_one_after_the_other():
     starts = np.tile(np.array([0, 0.4, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.0]), (20, 1))
     starts[:, 7:] = rng.normal(size=(20, 6)) * [2, 1, 0.3, 5, 5, 5]
     together = reference_impl.simulate(starts, body, world, 5e-3, 300)
+    monkeypatch.setattr(sys.modules["dropspin.reference_impl.simulate"], "BLOCK", len(points) + 1)
     turned = np.diff(together[:, :, 10:], axis=1).any(axis=2)
     assert turned.sum() > 400  # steps with an impulse
     for start, expected in zip(starts, together, strict=True):
@@ -115,23 +116,11 @@ def test_kernels_are_interpreted_if_the_user_disables_jit(interpreted):
     program = (
         "import test_kernels as t\nprint(t.alone({}).tobytes().hex())\n"
         "parts = t.reference_impl.kernels.Parts(True, False, True, True, True)\n"
-        "print(type(t.recording_kernel(t.Methods(), parts, 1)).__name__)"
+        "print(type(t.recording_kernel(t.Methods(), parts)).__name__)"
     )
     result, kind = in_a_process(program, NUMBA_DISABLE_JIT="1", PYTHONPATH=str(Path(__file__).parents[1])).split()
     assert kind == "function"
     assert result == alone({}).tobytes().hex()
-
-
-def test_ensemble_has_the_same_bits_on_a_processor_without_avx():
-    """There are fewer lanes, and every body has the same bits."""
-    program = (
-        "import test_kernels as t\nfrom dropspin.reference_impl import lanes\n"
-        "print(lanes.WIDTH, t.reference_impl.simulate(*t.tumbling(t.ALL, None), t.STEPS, threads=1).tobytes().hex())"
-    )
-    plain = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "PYTHONPATH": str(Path(__file__).parents[1])}
-    width, result = in_a_process(program, **plain).split()
-    assert width == "4"
-    assert result == reference_impl.simulate(*tumbling(ALL, None), STEPS, threads=1).tobytes().hex()
 
 
 SERVER = """
@@ -162,7 +151,7 @@ import dropspin.reference_impl as r
 body = r.Body(1.0, np.eye(3), np.zeros((1, 3)), (0.1, 0.1, 0.1))
 rows = r.simulate(np.array([0, 9, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.]), body, r.World(np.array([0, -1, 0])), 1.0, 1)
 from dropspin.reference_impl.kernels import Parts, recording_kernel
-kernel = recording_kernel(r.Methods(), Parts(gravity=True, forces=False, damping=False, floor=False, turning=False), 1)
+kernel = recording_kernel(r.Methods(), Parts(gravity=True, forces=False, damping=False, floor=False, turning=False))
 print(rows[-1, 8], sum(kernel.stats.cache_hits.values()), numba.config.CACHE_DIR == before)
 """
 
@@ -226,7 +215,7 @@ def test_user_s_cache_setting_survives_first_use_in_many_threads():
         "from dropspin.reference_impl import Methods\nbefore = numba.config.CACHE_DIR\n"
         "parts = Parts(True, False, False, True, True)\n"
         "with ThreadPoolExecutor(8) as pool:\n"
-        "    list(pool.map(lambda law: recording_kernel(Methods(law=law), parts, 1), ['note', 'normal', 'poisson', 'coulomb'] * 8))\n"
+        "    list(pool.map(lambda law: recording_kernel(Methods(law=law), parts), ['note', 'normal', 'poisson', 'coulomb'] * 8))\n"
         "print(numba.config.CACHE_DIR == before)\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

@@ -15,13 +15,11 @@ LEAVES = [*ROTATIONS.values(), *LAWS.values(), *CONTACTS.values(), *(leaf for le
 
 
 @pytest.mark.parametrize("leaf", LEAVES, ids=lambda leaf: leaf.__name__)
-def test_leaf_declares_its_order_lanes_cost_and_source(leaf):
+def test_leaf_declares_its_order_cost_and_source(leaf):
     assert leaf.ORDER in (1.0, 2.0, 4.0, math.inf, None)
-    assert isinstance(leaf.RUNS_IN_LANES, bool)
     lines = leaf.__doc__.splitlines()
     for fact in ("Order: ", "Cost: ", "Source: "):
         assert any(line.startswith(fact) for line in lines), fact
-    assert any(line.startswith("Lanes: none") for line in lines) == (not leaf.RUNS_IN_LANES)
 
 
 @pytest.mark.parametrize(
@@ -38,12 +36,6 @@ def test_leaf_declares_its_order_lanes_cost_and_source(leaf):
 )
 def test_order_is_the_lowest_of_the_parts_that_a_motion_needs(methods, gravity, damping, floor, order):
     assert methods.order(gravity=gravity, damping=damping, floor=floor) == order
-
-
-def test_ensemble_runs_in_lanes_unless_one_of_its_methods_cannot():
-    assert Methods(rotation="rk4", law="coulomb", correction="projection").runs_in_lanes
-    assert not Methods(rotation="exact").runs_in_lanes
-    assert not Methods(law="normal", contact="sequential").runs_in_lanes
 
 
 @pytest.mark.parametrize("law", LAWS)

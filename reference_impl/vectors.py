@@ -1,8 +1,8 @@
 """The value types of the equations: `Vec3`, `Quat`, `Mat3`.
 
 Each is a named tuple with operators, so that a line of a kernel has the form of the lecture note: `v + dt * g`, `R @ I_body @
-transpose(R)`. An operator is a plain function. In Python the method of the class calls it, and numba compiles the same source, so that
-interpreted and compiled arithmetic have the same rounding.
+transpose(R)`. Numba compiles the source of the operator that Python calls, so that interpreted
+and compiled arithmetic have the same rounding.
 """
 
 import operator
@@ -19,44 +19,12 @@ A call that is not inlined passes the state and the body, about sixty numbers, t
 """
 
 
-def _add3(a: "Vec3", b: "Vec3") -> "Vec3":
-    return Vec3(a.x + b.x, a.y + b.y, a.z + b.z)
-
-
-def _subtract3(a: "Vec3", b: "Vec3") -> "Vec3":
-    return Vec3(a.x - b.x, a.y - b.y, a.z - b.z)
-
-
 def _scale3(scale: float, a: "Vec3") -> "Vec3":
     return Vec3(scale * a.x, scale * a.y, scale * a.z)
 
 
-def _divide3(a: "Vec3", scale: float) -> "Vec3":
-    return Vec3(a.x / scale, a.y / scale, a.z / scale)
-
-
-def _negate3(a: "Vec3") -> "Vec3":
-    return Vec3(-a.x, -a.y, -a.z)
-
-
-def _add4(a: "Quat", b: "Quat") -> "Quat":
-    return Quat(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w)
-
-
 def _scale4(scale: float, a: "Quat") -> "Quat":
     return Quat(scale * a.x, scale * a.y, scale * a.z, scale * a.w)
-
-
-def _divide4(a: "Quat", scale: float) -> "Quat":
-    return Quat(a.x / scale, a.y / scale, a.z / scale, a.w / scale)
-
-
-def _add_matrix(a: "Mat3", b: "Mat3") -> "Mat3":
-    return Mat3(a.row1 + b.row1, a.row2 + b.row2, a.row3 + b.row3)
-
-
-def _subtract_matrix(a: "Mat3", b: "Mat3") -> "Mat3":
-    return Mat3(a.row1 - b.row1, a.row2 - b.row2, a.row3 - b.row3)
 
 
 def _scale_matrix(scale: float, a: "Mat3") -> "Mat3":
@@ -80,19 +48,19 @@ class Vec3(NamedTuple):
     z: float
 
     def __add__(self, other):
-        return _add3(self, other)
+        return Vec3(self.x + other.x, self.y + other.y, self.z + other.z)
 
     def __sub__(self, other):
-        return _subtract3(self, other)
+        return Vec3(self.x - other.x, self.y - other.y, self.z - other.z)
 
     def __rmul__(self, scale):
         return _scale3(scale, self)
 
     def __truediv__(self, scale):
-        return _divide3(self, scale)
+        return Vec3(self.x / scale, self.y / scale, self.z / scale)
 
     def __neg__(self):
-        return _negate3(self)
+        return Vec3(-self.x, -self.y, -self.z)
 
 
 class Quat(NamedTuple):
@@ -104,13 +72,13 @@ class Quat(NamedTuple):
     w: float
 
     def __add__(self, other):
-        return _add4(self, other)
+        return Quat(self.x + other.x, self.y + other.y, self.z + other.z, self.w + other.w)
 
     def __rmul__(self, scale):
         return _scale4(scale, self)
 
     def __truediv__(self, scale):
-        return _divide4(self, scale)
+        return Quat(self.x / scale, self.y / scale, self.z / scale, self.w / scale)
 
 
 class Mat3(NamedTuple):
@@ -121,10 +89,10 @@ class Mat3(NamedTuple):
     row3: Vec3
 
     def __add__(self, other):
-        return _add_matrix(self, other)
+        return Mat3(self.row1 + other.row1, self.row2 + other.row2, self.row3 + other.row3)
 
     def __sub__(self, other):
-        return _subtract_matrix(self, other)
+        return Mat3(self.row1 - other.row1, self.row2 - other.row2, self.row3 - other.row3)
 
     def __rmul__(self, scale):
         return _scale_matrix(scale, self)
@@ -197,16 +165,16 @@ def _register_operator(symbol: Callable[..., Any], source: Callable[..., Any], *
 
 
 for _symbol, _source, *_kinds in (
-    (operator.add, _add3, Vec3, Vec3),
-    (operator.sub, _subtract3, Vec3, Vec3),
+    (operator.add, Vec3.__add__, Vec3, Vec3),
+    (operator.sub, Vec3.__sub__, Vec3, Vec3),
     (operator.mul, _scale3, float, Vec3),
-    (operator.truediv, _divide3, Vec3, float),
-    (operator.neg, _negate3, Vec3),
-    (operator.add, _add4, Quat, Quat),
+    (operator.truediv, Vec3.__truediv__, Vec3, float),
+    (operator.neg, Vec3.__neg__, Vec3),
+    (operator.add, Quat.__add__, Quat, Quat),
     (operator.mul, _scale4, float, Quat),
-    (operator.truediv, _divide4, Quat, float),
-    (operator.add, _add_matrix, Mat3, Mat3),
-    (operator.sub, _subtract_matrix, Mat3, Mat3),
+    (operator.truediv, Quat.__truediv__, Quat, float),
+    (operator.add, Mat3.__add__, Mat3, Mat3),
+    (operator.sub, Mat3.__sub__, Mat3, Mat3),
     (operator.mul, _scale_matrix, float, Mat3),
     (operator.matmul, _apply, Mat3, Vec3),
     (operator.matmul, _compose, Mat3, Mat3),

@@ -23,7 +23,7 @@ from numba.core import config as numba_config
 from numpy.typing import NDArray
 
 from dropspin.reference_impl import sources
-from dropspin.reference_impl.methods import COLLIDE, CORRECTIONS, LAWS, ROTATIONS, Methods
+from dropspin.reference_impl.methods import COLLIDE, LAWS, ROTATIONS, Methods
 from dropspin.reference_impl.parameters import (
     STEP_SIZE,
     read_body,
@@ -71,8 +71,6 @@ def recording_kernel(methods: Methods, parts: Parts) -> Callable[..., int]:
     touches = parts.floor or parts.walls > 0  # otherwise methods that differ in contacts alone have one kernel
     law = LAWS[methods.law].impulse if touches else None
     collide = COLLIDE[methods.contact][methods.law] if touches else None
-    correction = CORRECTIONS[methods.correction] if touches else None
-    correct = None if correction is None else correction.correct
     walls_of, wall_count = _walls_of if parts.walls else _no_walls, parts.walls
     forces_of = _of_body if parts.forces else _none_of_body
     many_points_of = _of_body if parts.many_points else _none_of_body
@@ -97,9 +95,7 @@ def recording_kernel(methods: Methods, parts: Parts) -> Callable[..., int]:
             _record(recorded[number, 0], x, q, v, w)
             for row in range(1, recorded.shape[1]):
                 for _ in range(every):
-                    x, q, v, w, converged = advance(
-                        x, q, v, w, dt, body, gravity, on_vertices, damping, floor, walls, turn, collide, law, correct
-                    )
+                    x, q, v, w, converged = advance(x, q, v, w, dt, body, gravity, on_vertices, damping, floor, walls, turn, collide, law)
                     unsolved += not converged
                 _record(recorded[number, row], x, q, v, w)
         return unsolved

@@ -6,9 +6,8 @@ from types import ModuleType
 from typing import Any
 
 from dropspin.reference_impl.contacts import mean, sequential
-from dropspin.reference_impl.corrections import projection
 from dropspin.reference_impl.laws import clamped, coulomb, normal, note, poisson
-from dropspin.reference_impl.rotations import exact, gyroscopic, implicit_gyroscopic, midpoint, rk4, symmetric_top
+from dropspin.reference_impl.rotations import exact, gyroscopic, implicit_gyroscopic, midpoint, rk4
 from dropspin.reference_impl.rotations import note as note_rotation
 from dropspin.reference_impl.step import DAMPING_ORDER, TRANSLATION_DISCRETISATION, TRANSLATION_ORDER
 
@@ -28,12 +27,10 @@ ROTATIONS: Mapping[str, Leaf] = {
     "implicit-gyroscopic": implicit_gyroscopic,
     "midpoint": midpoint,
     "rk4": rk4,
-    "symmetric-top": symmetric_top,
     "exact": exact,
 }
 LAWS: Mapping[str, Leaf] = {"note": note, "normal": normal, "poisson": poisson, "clamped": clamped, "coulomb": coulomb}
 CONTACTS: Mapping[str, Leaf] = {"mean": mean, "sequential": sequential}
-CORRECTIONS: Mapping[str, Leaf | None] = {"none": None, "projection": projection}
 COLLIDE: Mapping[str, Mapping[str, KernelFunction]] = {
     "mean": dict.fromkeys(LAWS, mean.collide),
     "sequential": {"normal": sequential.collide_normal, "coulomb": sequential.collide_coulomb},
@@ -52,14 +49,12 @@ class Methods:
     rotation: str = "note"
     law: str = "note"
     contact: str = "mean"
-    correction: str = "none"
 
     def __post_init__(self) -> None:
         for place, chosen, known in (
             ("rotation", self.rotation, list(ROTATIONS)),
             ("law", self.law, list(LAWS)),
             ("contact", self.contact, list(CONTACTS)),
-            ("correction", self.correction, list(CORRECTIONS)),
         ):
             if chosen not in known:
                 raise ValueError(f"{place}: got {chosen!r}; must be one of {', '.join(known)}")
@@ -77,8 +72,7 @@ class Methods:
         orders: list[float | None] = [ROTATIONS[self.rotation].ORDER]
         orders += [TRANSLATION_ORDER] if gravity else []
         orders += [DAMPING_ORDER] if damping else []
-        leaves = LAWS[self.law], CONTACTS[self.contact], CORRECTIONS[self.correction]
-        orders += [leaf.ORDER for leaf in leaves if leaf is not None] if floor else []
+        orders += [LAWS[self.law].ORDER, CONTACTS[self.contact].ORDER] if floor else []
         claimed = [order for order in orders if order is not None]
         return min(claimed) if len(claimed) == len(orders) else None
 

@@ -1,6 +1,6 @@
 """One time step: Algorithm 1 of the lecture note, line by line.
 
-A part that is None (gravity, forces, damping, floor, walls, rotation or correction) is left out of the compiled step.
+A part that is None (gravity, forces, damping, floor, walls or rotation) is left out of the compiled step.
 
 Order: 1 for the translation under gravity, as semi-implicit Euler, and under damping, which is exact but acts before the motion.
 Source: H. Wang, Rigid Body Dynamics (lecture note), Algorithm 1.
@@ -8,7 +8,7 @@ Source: H. Wang, Rigid Body Dynamics (lecture note), Algorithm 1.
 
 from dropspin.reference_impl.quaternion import rotation_matrix
 from dropspin.reference_impl.vectors import Vec3, compiled, cross, row, transpose
-from dropspin.reference_impl.walls import collide_with_walls, correct_at_walls
+from dropspin.reference_impl.walls import collide_with_walls
 
 TRANSLATION_ORDER = 1.0
 DAMPING_ORDER = 1.0
@@ -16,7 +16,7 @@ TRANSLATION_DISCRETISATION = "semi-implicit Euler"
 
 
 @compiled
-def advance(x, q, v, w, dt, body, gravity, forces, damping, floor, walls, turn, collide, law, correct):
+def advance(x, q, v, w, dt, body, gravity, forces, damping, floor, walls, turn, collide, law):
     """The state (x, q, v, ω) after one step of dt, and whether the contact iteration converged."""
     converged = True
     if gravity is not None:
@@ -34,11 +34,6 @@ def advance(x, q, v, w, dt, body, gravity, forces, damping, floor, walls, turn, 
     x = x + dt * v  # eq 1: with the new velocity
     if turn is not None:
         q, w = turn(q, w, dt, body)  # eq 6, or the rotation chosen instead
-    if correct is not None:
-        if floor is not None:
-            x = correct(x, q, body, floor)
-        if walls is not None:
-            x = correct_at_walls(x, q, body, walls, correct)
     return x, q, v, w, converged
 
 

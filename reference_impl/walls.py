@@ -27,14 +27,3 @@ def collide_with_walls(x, q, v, w, body, walls, collide, law, converged):
             w = w + transpose(wall.frame) @ (w_out - w_in)
             converged = converged and solved
     return v, w, converged
-
-
-@compiled
-def correct_at_walls(x, q, body, walls, correct):
-    """The position after the correction at each wall."""
-    columns, count = walls
-    for number in range(count):
-        wall = read_wall(columns, number)
-        at = wall.frame @ x - wall.distance * N
-        x = x + transpose(wall.frame) @ (correct(at, product(wall.turn, q), body, wall.surface) - at)
-    return x

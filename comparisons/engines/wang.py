@@ -15,7 +15,7 @@ from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.measuring.comparison import exactly
 from dropspin.comparisons.measuring.metrics import values_of
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
-from dropspin.reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
+from dropspin.reference_impl.methods import CONTACTS, LAWS, ROTATIONS
 from dropspin.scenarios import DropspinError, Scenario, Truth, truth_for
 from dropspin.scenarios.bodies import SHAPES, Body, Box, Sphere, Vertices
 from dropspin.scenarios.damping import Damping
@@ -33,7 +33,6 @@ class Wang(Engine):
         "rotation": tuple(ROTATIONS),
         "law": tuple(LAWS),
         "contact": tuple(CONTACTS),
-        "correction": tuple(CORRECTIONS),
     }
 
     def __post_init__(self) -> None:
@@ -64,7 +63,7 @@ class Wang(Engine):
         rotation = self.option("rotation")
         if rotation in ("note", "exact") and scene.floor is None:
             return flight_error(scene, truth, metric, dt, exact_rotation=rotation == "exact")
-        return bounce_error(scene, truth, metric, dt, gravity_first=True) if self.option("correction") == "none" else None
+        return bounce_error(scene, truth, metric, dt, gravity_first=True)
 
     def declines(self, scene: Scenario) -> str | None:
         """Most laws take no finite coefficient of friction."""

@@ -16,7 +16,7 @@ from dropspin import reference_impl
 from dropspin.reference_impl import Body, Floor, Methods, World
 from dropspin.reference_impl.floor_plane import BLOCK
 from dropspin.reference_impl.kernels import recording_kernel
-from dropspin.reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
+from dropspin.reference_impl.methods import CONTACTS, LAWS, ROTATIONS
 from dropspin.reference_impl.state import ORIENTATION
 
 PACKAGE = Path(reference_impl.__file__).parent
@@ -55,7 +55,6 @@ def test_covering_choices_contain_every_leaf():
     assert {methods.rotation for methods in chosen} == set(ROTATIONS)
     assert {methods.law for methods in chosen} == set(LAWS)
     assert {methods.contact for methods in chosen} == set(CONTACTS)
-    assert {methods.correction for methods in chosen} == set(CORRECTIONS)
 
 
 @pytest.fixture

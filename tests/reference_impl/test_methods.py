@@ -9,9 +9,9 @@ import dropspin.reference_impl.state
 import dropspin.scenarios.state
 from dropspin.comparisons.engines import mapping
 from dropspin.reference_impl import Body, Floor, Methods, World, simulate
-from dropspin.reference_impl.methods import COLLIDE, CONTACTS, CORRECTIONS, LAWS, ROTATIONS
+from dropspin.reference_impl.methods import COLLIDE, CONTACTS, LAWS, ROTATIONS
 
-LEAVES = [*ROTATIONS.values(), *LAWS.values(), *CONTACTS.values(), *(leaf for leaf in CORRECTIONS.values() if leaf)]
+LEAVES = [*ROTATIONS.values(), *LAWS.values(), *CONTACTS.values()]
 
 
 @pytest.mark.parametrize("leaf", LEAVES, ids=lambda leaf: leaf.__name__)
@@ -31,7 +31,7 @@ def test_leaf_declares_its_order_cost_and_source(leaf):
         (Methods(rotation="rk4"), False, True, False, 1.0),
         (Methods(rotation="exact"), False, False, False, math.inf),
         (Methods(rotation="exact"), True, False, True, None),
-        (Methods(rotation="midpoint", correction="projection"), False, False, False, 2.0),
+        (Methods(rotation="midpoint"), False, False, False, 2.0),
     ],
 )
 def test_order_is_the_lowest_of_the_parts_that_a_motion_needs(methods, gravity, damping, floor, order):

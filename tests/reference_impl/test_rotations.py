@@ -35,7 +35,6 @@ ASYMPTOTIC_RANGES = {
     "implicit-gyroscopic": (0.0125, 0.00625, 0.003125),
     "midpoint": (0.1, 0.05, 0.025),
     "rk4": (0.1, 0.05, 0.025),
-    "symmetric-top": (0.2, 0.1, 0.05),
 }
 
 
@@ -101,7 +100,7 @@ def kept(rotation, size, steps=20_000):
     return abs(energy[-1] / energy[0] - 1), np.linalg.norm(L[-1] - L[0]) / np.linalg.norm(L[0])
 
 
-@pytest.mark.parametrize(("rotation", "energy"), [("midpoint", 1e-11), ("symmetric-top", 1e-5), ("exact", 1e-11)])
+@pytest.mark.parametrize(("rotation", "energy"), [("midpoint", 1e-11), ("exact", 1e-11)])
 def test_energy_and_angular_momentum_are_conserved(rotation, energy):
     """20,000 steps of |ω| dt = 0.1: L in space to 1e-11 (measured 3e-12), energy to rounding, or without drift."""
     drift, momentum = kept(rotation, 0.1)
@@ -124,7 +123,7 @@ def test_rotations_do_not_depend_on_the_body_frame():
     frame = np.array([0.1, -0.5, 0.3, 0.8]) / np.linalg.norm([0.1, -0.5, 0.3, 0.8])
     axes = rotate(frame, np.eye(3)).T
     w = np.array([0.3, 1.0, -0.4])
-    for rotation in ("gyroscopic", "implicit-gyroscopic", "midpoint", "rk4", "symmetric-top", "exact"):
+    for rotation in ("gyroscopic", "implicit-gyroscopic", "midpoint", "rk4", "exact"):
         rows = [
             reference_impl.simulate(
                 np.concatenate([np.zeros(3), start, np.zeros(3), w]), Body(1.0, inertia, POINTS), World(), 0.01, 100, 100,
@@ -156,7 +155,7 @@ def test_elliptic_functions_match_scipy_and_mpmath():
             assert sn_cn_dn(u, m1) == pytest.approx(exact, rel=1e-12, abs=1e-14)
 
 
-@pytest.mark.parametrize("rotation", ["midpoint", "symmetric-top", "exact"])
+@pytest.mark.parametrize("rotation", ["midpoint", "exact"])
 def test_energy_does_not_drift_by_rounding(rotation):
     """Rounding of the attitude has no bias: at most 1e-16 a step over 100,000 steps (measured 6e-17; 4e-16 without the division by q·q)."""
     body = Body(1.0, np.diag([1.0, 2.0, 3.0]), np.full((1, 3), 0.1))
@@ -164,15 +163,6 @@ def test_energy_does_not_drift_by_rounding(rotation):
     rows = reference_impl.simulate(start, body, World(), 1e-3, 100_000, 100_000, Methods(rotation=rotation))
     energy = [0.5 * (np.diag(body.inertia) @ Rotation.from_quat(row[ORIENTATION]).inv().apply(row[SPIN]) ** 2) for row in rows]
     assert abs(energy[1] / energy[0] - 1) <= 1e-11
-
-
-def test_symmetric_top_is_exact_for_a_symmetric_body_about_any_axis():
-    """Any step, axis of symmetry along x, y or z: the closed form of two rotations, to 1e-12."""
-    for axis in range(3):
-        moments = np.full(3, 2.0)
-        moments[axis] = 3.1
-        _, error = turned("symmetric-top", tuple(moments), (0.5, -1.0, 2.0), 10.0, 5)
-        assert error <= 1e-12
 
 
 def test_midpoint_solves_its_equation_at_large_angles():

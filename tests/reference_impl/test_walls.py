@@ -46,7 +46,7 @@ def test_motion_between_walls_matches_the_transcription(sticking):
     [
         pytest.param(BOX, Methods(law="coulomb", contact="sequential"), id="box"),
         pytest.param(BALL, Methods(law="coulomb", contact="sequential"), id="ball"),
-        pytest.param(CYLINDER, Methods(law="coulomb", correction="projection"), id="cylinder"),
+        pytest.param(CYLINDER, Methods(law="coulomb"), id="cylinder"),
     ],
 )
 def test_wall_is_a_floor_seen_from_elsewhere(body, methods):
@@ -86,7 +86,7 @@ def test_bodies_between_walls_move_in_an_ensemble_as_alone():
         np.testing.assert_array_equal(reference_impl.simulate(start, BOX, worlds, 1e-3, 300), rows)
 
 
-@pytest.mark.parametrize("methods", [Methods(), Methods(law="normal", contact="sequential", correction="projection")], ids=str)
+@pytest.mark.parametrize("methods", [Methods(), Methods(law="normal", contact="sequential")], ids=str)
 def test_floor_carries_no_point_beyond_its_end(methods):
     floor = Floor(0.0, 0.0, 0.0, (1.0, 0.5), 0.3)
 

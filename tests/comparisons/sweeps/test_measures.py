@@ -130,7 +130,7 @@ EVERYTHING = [
     {
         "scenes": ["drop-ball"],
         "engines": ["wang"],
-        "grid": {"floor.friction": [0.0, 0.3], "engine.correction": ["none", "projection"]},
+        "grid": {"floor.friction": [0.0, 0.3], "engine.law": ["note", "normal"]},
         "random": {"count": 6, "seed": 1, "dt": {"from": 1e-3, "to": 0.3, "spacing": "log"}, "duration": {"from": 0.1, "to": 0.5}},
         "metrics": ["energy_error", "bounce_height_error"],
     },

@@ -14,9 +14,10 @@ from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, compiled
 Array = NDArray[np.float64]
 Test = Callable[[Array], NDArray[np.bool_]]
 
-# The first column of each quantity: `pack` writes them in this order, the functions at the end of this file read them.
-STEP_SIZE, GRAVITY, DAMPING, FLOOR, MASS, INERTIA, INVERSE_INERTIA, MOMENTS, AXES, SEMI_AXES, REACH = 0, 1, 4, 6, 9, 10, 19, 28, 31, 35, 38
-EDGES, WALLS, WALL_COLUMNS = 39, 42, 17
+# The first column of each quantity: `pack` writes them in the order of `_quantities`, then what follows from them, then the walls.
+STEP_SIZE, GRAVITY, DAMPING, FLOOR, EDGES, MASS, INERTIA, SEMI_AXES = 0, 1, 4, 6, 9, 12, 13, 22
+INVERSE_INERTIA, MOMENTS, AXES, REACH = 25, 34, 37, 41
+WALLS, WALL_COLUMNS, WALL = 42, 17, "walls"
 
 
 class Parameters(NamedTuple):
@@ -43,26 +44,10 @@ def pack(body: Body, world: World, dt: float | Array) -> Parameters:
     points = given.pop("points")
     # The margin covers the rounding of R: no vertex may reach the floor before the bounding sphere does.
     reach = (np.sqrt(np.max(np.sum(points**2, axis=2), axis=1)) + given["semi_axes"].max(axis=1)) * (1.0 + 1e-12)
-    inertia = given["inertia"]
-    moments, axes = _principal(inertia)
-    in_order = [
-        given["dt"],
-        given["gravity"],
-        _decay(given["linear damping"], given["dt"]),
-        _decay(given["angular damping"], given["dt"]),
-        given["restitution"],
-        given["friction"],
-        given["rest_speed"],
-        given["mass"],
-        inertia,
-        np.linalg.inv(inertia),
-        moments,
-        axes,
-        given["semi_axes"],
-        reach,
-        given["half_extents"],
-        given["thickness"],
-    ]
+    for rate in ("linear damping", "angular damping"):
+        given[rate] = _decay(given[rate], given["dt"])
+    own = [values for name, values in given.items() if not name.startswith(WALL)]
+    in_order = [*own, np.linalg.inv(given["inertia"]), *_principal(given["inertia"]), reach]
     for name in _walls(world):
         frames = _frames(given[f"{name}normal"])
         in_order += [given[f"{name}restitution"], given[f"{name}friction"], given[f"{name}rest_speed"], frames]
@@ -104,7 +89,7 @@ def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[
 
 def _walls(world: World) -> dict[str, Wall]:
     """The walls by the beginning of the names of their quantities."""
-    return {f"walls[{number}].": wall for number, wall in enumerate(world.walls)}
+    return {f"{WALL}[{number}].": wall for number, wall in enumerate(world.walls)}
 
 
 def _surface(name: str, surface: Floor) -> dict[str, tuple[ArrayLike, tuple[int, ...], str, Test]]:

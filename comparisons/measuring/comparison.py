@@ -114,16 +114,6 @@ class Comparison:
         return States(self.scene, self.reference)
 
     @property
-    def energy(self) -> Array:
-        """Energy of the motion, velocity synchronised with position [J], shape (n,)."""
-        return self.states.energy
-
-    @property
-    def lowest_height(self) -> Array:
-        """Height of the body's lowest point above the floor [m], shape (n,)."""
-        return self.motions.lowest_height
-
-    @property
     def angular_momentum(self) -> Array:
         """Angular momentum of the motion at the reference's times [kg m²/s], shape (m, 3)."""
         return self.states.angular_momentum[: len(self.exact)]

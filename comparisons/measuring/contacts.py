@@ -81,7 +81,7 @@ def contact_residuals(scene: Scenario, states: Array, motions: Motions) -> Conta
     assert scene.floor is not None
     motion, steps = np.nonzero(np.atleast_2d(motions.states.touching))
     in_contact = np.atleast_2d(motions.in_contact)[motion, steps]
-    rows, lowest = states.reshape(-1, *states.shape[-2:]), np.atleast_2d(motions.lowest_height)
+    rows, lowest = states.reshape(-1, *states.shape[-2:]), np.atleast_2d(motions.states.lowest_height)
     before, after = (Trajectory.from_states(np.zeros(len(steps)), rows[motion, row]) for row in (steps, steps + 1))
     scale, dt = np.atleast_1d(motions.energy_scale)[motion], np.broadcast_to(motions.dt, len(rows))[motion, np.newaxis]
     energy = np.where(scale == 0.0, 1.0, scale)  # a body at rest without gravity violates nothing
@@ -141,7 +141,7 @@ def contacts(scene: Scenario, motion: Trajectory) -> "pd.DataFrame":
             "start": motion.t[starts],
             "end": motion.t[ends],
             "impulse": scene.body.mass * (motion.velocity[ends, 1] - motion.velocity[starts, 1] - falling),
-            "energy_change": motions.energy[ends] - motions.energy[starts],
+            "energy_change": motions.states.energy[ends] - motions.states.energy[starts],
             **residuals,
         }
     )

@@ -64,7 +64,8 @@ def energy_error_raw(case: Comparison) -> Array:
 @_metric("1", "invariant", requirements.keeps_energy_in_flight, signed=True, first_flight=True)
 def energy_drift(case: Comparison | Motions) -> Array:
     """Change of energy from the start to the end of the first flight, over the scene's energy."""
-    return (at_rows(case.energy, case.first_flight_end) - case.energy[..., 0]) / case.energy_scale
+    energy = case.states.energy
+    return (at_rows(energy, case.first_flight_end) - energy[..., 0]) / case.energy_scale
 
 
 @_metric("1", "invariant", requirements.gains_no_energy)
@@ -208,7 +209,7 @@ def orientation_error(case: Comparison) -> float:
 @_metric("m", "invariant", requirements.has_floor)
 def penetration(case: Comparison | Motions) -> Array:
     """Largest depth of the body's lowest point below the floor."""
-    return np.maximum(-case.lowest_height, 0.0).max(axis=-1)
+    return np.maximum(-case.states.lowest_height, 0.0).max(axis=-1)
 
 
 @_metric("1", "invariant", requirements.obeys_contact_laws)

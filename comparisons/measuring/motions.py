@@ -133,16 +133,6 @@ class Motions:
         """One motion of a scene: at least two rows, equally spaced in time."""
         return cls(Setup.of(scene), States(scene, motion), np.asarray(motion.t[1] - motion.t[0]), np.asarray(len(motion) - 1))
 
-    @property
-    def energy(self) -> Array:
-        """Kinetic plus potential energy, velocity synchronised with position [J], shape (..., n)."""
-        return self.states.energy
-
-    @property
-    def lowest_height(self) -> Array:
-        """Height of the body's lowest point above the floor [m], shape (..., n)."""
-        return self.states.lowest_height
-
     @cached_property
     def energy_scale(self) -> Array:
         """The scene's energy [J], shape (...): M g H down to the floor or the start's kinetic energy, whichever is larger.
@@ -181,7 +171,7 @@ class Motions:
 
         Of many motions it is not known beside walls.
         """
-        return (self.energy - np.minimum.accumulate(self._energy_with_stored(), axis=-1)).max(axis=-1)
+        return (self.states.energy - np.minimum.accumulate(self._energy_with_stored(), axis=-1)).max(axis=-1)
 
     def _energy_with_stored(self) -> Array:
         """Energy plus the largest energy that a contact may have stored and give back [J], shape (..., n); unknown, inf, at a wall.
@@ -192,7 +182,7 @@ class Motions:
         """
         runs = self.contacts
         motion, step, number = runs.steps
-        energy, lowest, velocity = map(np.atleast_2d, (self.energy, self.lowest_height, self.states.vertical_velocity))
+        energy, lowest, velocity = map(np.atleast_2d, (self.states.energy, self.states.lowest_height, self.states.vertical_velocity))
         fall, dt, mass = (np.broadcast_to(one, len(energy))[motion] for one in (self.fall, self.dt, self.setup.mass))
         rise, sinking = velocity[motion, step + 1] - velocity[motion, step], lowest[motion, step] - lowest[motion, step + 1]
         compressed = (rise > STEADY * fall) & (sinking > RESOLVED * fall * dt)
@@ -207,7 +197,7 @@ class Motions:
             lost = energy[motion, before] - energy[motion, row]
             stored = np.minimum(force * np.maximum(level - lowest[motion, row], 0.0), lost)
             found[motion, row] = np.maximum(found[motion, row], energy[motion, row] + stored)
-        found = found.reshape(self.energy.shape)
+        found = found.reshape(self.states.energy.shape)
         if self.setup.walls:
             assert isinstance(self.states, States)
             found[self.states.near_wall] = np.inf

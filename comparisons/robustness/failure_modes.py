@@ -92,7 +92,7 @@ def _energy_gain(whole: Comparison) -> Iterator[Diagnosis]:
         scale = whole.energy_scale
     except Unresolved:
         return
-    gain = float(np.max(whole.energy) - whole.energy[0]) / scale
+    gain = float(np.max(whole.states.energy) - whole.states.energy[0]) / scale
     if not gain <= BLOWN_UP:
         yield Diagnosis("diverged", "blows up", gain, f"the energy rises by {gain:.1e} times the scene's energy")
     elif gain > (limit := GAIN_BY_LAW if _may_gain(whole.scene) else GAIN):

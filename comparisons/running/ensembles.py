@@ -46,7 +46,7 @@ def run_ensemble(engine: Engine, scene: Scenario, dt: float, most: int | None = 
             scale = np.where(motions.energy_scale == 0.0, 1.0, motions.energy_scale)  # where nothing moves and nothing pulls
             shown = states[:, rows].reshape(-1, 13)
             momentum = angular_momentum(scene, Trajectory.from_states(np.zeros(len(shown)), shown)).reshape(len(states), -1, 3)
-            energies.append(motions.energy[:, rows] / scale[:, np.newaxis])
+            energies.append(motions.states.energy[:, rows] / scale[:, np.newaxis])
             momenta.append(np.linalg.norm(momentum, axis=-1) / (scene.body.size * np.sqrt(2.0 * scale * scene.body.mass))[:, np.newaxis])
             rebounds.append(motions.rebound)
             rest_times.append(t[motions.last_row_in_motion])

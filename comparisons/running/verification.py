@@ -3,7 +3,6 @@
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Engine, KnownLimitation, Simulation, numpy_array
 from dropspin.comparisons.engines.exceptions import LONGEST, described, short
-from dropspin.reference_impl.threads import share_out
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.model import initial_states
 from dropspin.scenarios.rotations import length
@@ -108,21 +106,11 @@ def verified_batch(states: Any, size: int, rows: int) -> NDArray[np.float64]:
     batch = numpy_array(states)
     if batch.ndim == 0 or len(batch) != size:
         raise BuildMismatch(f"the record of a batch has shape {batch.shape}; {size} motions were asked for, shape ({size}, {rows}, 13)")
-    if batch.shape == (size, rows, 13) and batch.dtype == float and not share_out(partial(_doubtful, batch), size, rows, None):
-        return batch
-    for motion in batch:
-        verified_record(motion, rows)
-    return np.asarray(batch, dtype=float)
-
-
-def _doubtful(batch: NDArray[np.float64], first: int, last: int) -> int:
-    """Whether not all quaternions of some motions are surely of length 1; a few motions at a time, which fit a processor's cache."""
-    for few in range(first, last, 8):
-        q = batch[few : min(few + 8, last), :, ORIENTATION]
-        squares = np.einsum("...i,...i->...", q, q)
-        if not max(squares.max() - 1.0, 1.0 - squares.min()) <= UNIT_TOLERANCE:  # at least as far from 1 as the length; NaN is not
-            return 1
-    return 0
+    if batch.shape == (size, rows, 13) and batch.dtype == float:
+        squares = np.einsum("...i,...i->...", batch[..., ORIENTATION], batch[..., ORIENTATION])
+        if max(squares.max() - 1.0, 1.0 - squares.min()) <= UNIT_TOLERANCE:  # at least as far from 1 as the lengths; NaN is not
+            return batch
+    return np.array([verified_record(motion, rows) for motion in batch])
 
 
 def verified_limitations(limitations: Any) -> tuple[KnownLimitation, ...]:

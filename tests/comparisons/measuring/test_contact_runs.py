@@ -153,7 +153,7 @@ def test_energy_gained_in_a_second_soft_contact_is_measured(stiffness, damping):
     motion, sound = (spring(stiffness, damping, 2e-4, later_gain=gain) for gain in (1.1, 1.0))
     first = int(np.argmax(np.any(motion.states != sound.states, axis=1)))
     gained = 0.21 * 0.5 * sound.velocity[first, 1] ** 2 / (G * H)
-    energy = Comparison(BALL, motion).energy
+    energy = Comparison(BALL, motion).states.energy
     assert energy[first:].max() < 0.9 * energy[0]
     assert 0.7 * gained <= measure(BALL, motion)["energy_gain"] <= 1.02 * gained
 
@@ -167,7 +167,7 @@ def test_energy_gained_in_a_contact_that_lasts_is_measured(factor):
     states[exact.t > 0.7, 10:] *= factor
     states[exact.t > 0.7, 7:10] *= factor
     motion = Trajectory.from_states(exact.t, states)
-    energy = Comparison(scene, motion).energy
-    plain = (energy - np.minimum.accumulate(energy)).max() / float(Motions.of(scene, motion).energy_scale)
+    energy = Comparison(scene, motion).states.energy
+    plain = (energy - np.minimum.accumulate(energy)).max() / float(Motions.of(scene, motion).states.energy_scale)
     assert plain > 1e-3
     assert measure(scene, motion)["energy_gain"] == plain

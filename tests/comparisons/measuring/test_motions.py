@@ -174,9 +174,9 @@ def test_energy_and_lowest_height_of_general_states_to_30_digits(measured, seed)
             kinetic = (2 * (v.T * v)[0] + (spin.T * inertia * spin)[0]) / 2
             energies.append(float(kinetic - 2 * (g.T * (x - origin))[0] + mpmath.mpf(lag) * 2 * (g.T * v)[0]))
             heights.append(float(x[1] + min((turn * mpmath.matrix(p))[1] for p in scene.body.vertices.tolist())))
-    found = measured(scene, states, lambda m: m.energy, lag)[: len(states)]
+    found = measured(scene, states, lambda m: m.states.energy, lag)[: len(states)]
     np.testing.assert_allclose(found, energies, rtol=0.0, atol=1e-14 * np.abs(energies).max())
-    found = measured(scene, states, lambda m: m.lowest_height)[: len(states)]
+    found = measured(scene, states, lambda m: m.states.lowest_height)[: len(states)]
     reached = np.isfinite(found)
     np.testing.assert_allclose(found[reached], np.array(heights)[reached], rtol=0.0, atol=1e-14)
     assert (np.array(heights)[~reached] >= 0.0).all()
@@ -190,7 +190,7 @@ def test_metrics_of_general_motions_have_the_same_bits_in_a_batch(seed, without)
     states[10:13, 7:10] = states[10, 7:10] + DT * np.arange(3)[:, np.newaxis] * scene.acceleration  # a flight of two steps
     alone = Motions.of(scene, Trajectory.from_states(DT * np.arange(len(states)), states, 0.005))
     together = in_a_batch(scene, states, 0.005)
-    np.testing.assert_array_equal(alone.energy, together.energy[1, : len(states)])
+    np.testing.assert_array_equal(alone.states.energy, together.states.energy[1, : len(states)])
     for quantity in ("energy_scale", "rebound", "last_row_in_motion", "first_flight_end"):
         assert getattr(alone, quantity) == getattr(together, quantity)[1], quantity
     for rows, in_batch in zip(alone.first_contact, together.first_contact, strict=True):

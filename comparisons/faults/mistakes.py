@@ -49,14 +49,6 @@ def _not_inverted(q: Array, w: Array, inertia: Array) -> Array:
     return rotate(q, inertia @ cross(inertia @ spin, spin))
 
 
-def _opposite(q: Array, w: Array, inertia: Array) -> Array:
-    return -_gyroscopic(q, w, inertia)
-
-
-def _linear(speed: float) -> float:
-    return 1.0
-
-
 @dataclass(frozen=True)
 class Mistake:
     """One mistake.
@@ -65,16 +57,16 @@ class Mistake:
         message: The mistake, and what is right.
         acceleration: Function of orientation, angular velocity and inertia that returns the angular acceleration.
         swapped: Whether the factors of the quaternion product are swapped.
-        turning: Function of the angular speed that returns the factor by which the orientation turns too fast.
-        drag: Function of a speed that returns the factor by which damping is too strong, of the velocity and of the angular velocity.
+        turning: Factor by which the orientation turns too fast; None for the angular speed itself.
+        squares: Whether damping is too strong by the speed, of the velocity and of the angular velocity.
         is_peculiarity: Never, as in a `FaultModel` of an adapter.
     """
 
     message: str
     acceleration: Callable[[Array, Array, Array], Array] = _gyroscopic
     swapped: bool = False
-    turning: Callable[[float], float] = _linear
-    drag: tuple[Callable[[float], float], Callable[[float], float]] = (_linear, _linear)
+    turning: float | None = 1.0
+    squares: tuple[bool, bool] = (False, False)
     is_peculiarity: ClassVar[bool] = False
 
     def motion(self, scene: Scenario, times: Array) -> Array | None:
@@ -83,9 +75,9 @@ class Mistake:
         None with a floor, if the body turns too often, and for a mistake of damping without damping, as it then is none.
         """
         spin = float(np.linalg.norm(scene.start.angular_velocity))
-        if scene.damping is None and self.drag != (_linear, _linear):
+        if scene.damping is None and any(self.squares):
             return None
-        if scene.floor is not None or self.turning(spin) * spin * times[-1] > FARTHEST:
+        if scene.floor is not None or (self.turning or spin) * spin * times[-1] > FARTHEST:
             return None
         return _integrated(self, scene, tuple(times.tolist()))
 
@@ -93,11 +85,13 @@ class Mistake:
         """The rates of change of a state, shape (13,)."""
         q, v, w = state[ORIENTATION], state[VELOCITY], state[SPIN]
         linear, angular = (scene.damping.linear, scene.damping.angular) if scene.damping else (0.0, 0.0)
-        found, spin = np.empty(13), np.append(0.5 * self.turning(float(np.linalg.norm(w))) * w, 0.0)
-        found[POSITION], found[VELOCITY] = v, scene.acceleration - linear * self.drag[0](float(np.linalg.norm(v))) * v
+        factors = [float(np.linalg.norm(rate)) if square else 1.0 for rate, square in zip((v, w), self.squares, strict=True)]
+        turning = float(np.linalg.norm(w)) if self.turning is None else self.turning
+        found, spin = np.empty(13), np.append(0.5 * turning * w, 0.0)
+        found[POSITION], found[VELOCITY] = v, scene.acceleration - linear * factors[0] * v
         found[ORIENTATION] = multiply(q, spin) if self.swapped else multiply(spin, q)
         unit = q / np.linalg.norm(q)
-        found[SPIN] = self.acceleration(unit, w, scene.body.inertia_tensor) - angular * self.drag[1](float(np.linalg.norm(w))) * w
+        found[SPIN] = self.acceleration(unit, w, scene.body.inertia_tensor) - angular * factors[1] * w
         return found
 
 
@@ -113,26 +107,22 @@ def _integrated(mistake: Mistake, scene: Scenario, times: tuple[float, ...]) -> 
     return np.asarray(found)
 
 
-def _speed(speed: float) -> float:
-    return speed
-
-
 MISTAKES = (
     *(
         mistake
         for torque in (_no_torque, _gyroscopic)
         for mistake in (
             Mistake(ORDER, torque, swapped=True),
-            Mistake(f"{SQUARE}: a step turns the body by |ω| dt about ω", torque, turning=_speed),
-            Mistake("the body turns twice as fast as its angular velocity says: q' = 1/2 (ω, 0) q", torque, turning=lambda _: 2.0),
-            Mistake("the body turns half as fast as its angular velocity says: q' = 1/2 (ω, 0) q", torque, turning=lambda _: 0.5),
-            Mistake(f"{SQUARE}: damping is in proportion to the velocity", torque, drag=(_speed, _linear)),
-            Mistake(f"{SQUARE}: damping is in proportion to the angular velocity", torque, drag=(_linear, _speed)),
-            Mistake(f"{SQUARE}: damping is in proportion to the velocity, and to the angular velocity", torque, drag=(_speed, _speed)),
+            Mistake(f"{SQUARE}: a step turns the body by |ω| dt about ω", torque, turning=None),
+            Mistake("the body turns twice as fast as its angular velocity says: q' = 1/2 (ω, 0) q", torque, turning=2.0),
+            Mistake("the body turns half as fast as its angular velocity says: q' = 1/2 (ω, 0) q", torque, turning=0.5),
+            Mistake(f"{SQUARE}: damping is in proportion to the velocity", torque, squares=(True, False)),
+            Mistake(f"{SQUARE}: damping is in proportion to the angular velocity", torque, squares=(False, True)),
+            Mistake(f"{SQUARE}: damping is in proportion to the velocity, and to the angular velocity", torque, squares=(True, True)),
         )
     ),
     Mistake(NOT_ROTATED, _not_rotated),
     Mistake(ROTATED_BACK, _rotated_back),
     Mistake(NOT_INVERTED, _not_inverted),
-    Mistake("the gyroscopic term has the opposite sign: ω' = I⁻¹ (I ω × ω) without torque", _opposite),
+    Mistake("the gyroscopic term has the opposite sign: ω' = I⁻¹ (I ω × ω) without torque", lambda *given: -_gyroscopic(*given)),
 )

@@ -14,6 +14,7 @@ from dropspin.comparisons.robustness import operating_point as to
 from dropspin.comparisons.robustness.operating_point import OperatingPoint
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies.inertia import is_diagonal
+from dropspin.scenarios.variations import changed, in_units, with_inertia_ratio, with_size
 
 Between = Callable[[float, float, float], float | None]
 """A function of two values and a ratio that returns the value halfway between them, or None if their ratio is smaller than that ratio."""
@@ -132,21 +133,24 @@ AXES = {
             applies=to.falls,
         ),
         Axis(
-            "inertia-ratio", "1", lambda nominal: logarithmic(1.0, 1e6, 7), _inertia_ratio, to.with_inertia_ratio,
+            "inertia-ratio", "1", lambda nominal: logarithmic(1.0, 1e6, 7), _inertia_ratio,
+            to.of_scene(with_inertia_ratio),
             applies=_has_principal_axes,
         ),
         Axis(
-            "mass", "kg", masses, lambda nominal: nominal.scene.body.mass, to.with_mass,
+            "mass", "kg", masses, lambda nominal: nominal.scene.body.mass,
+            to.of_scene(lambda scene, mass: in_units(scene, mass=mass / scene.body.mass)),
             between=whole_power_between(2.0), invariant=True,
         ),
         Axis(
-            "restitution", "1", lambda nominal: [0.0, 0.5, 0.9, 0.99, 0.999, 0.9999], _restitution, to.with_restitution,
+            "restitution", "1", lambda nominal: [0.0, 0.5, 0.9, 0.99, 0.999, 0.9999], _restitution,
+            to.of_scene(lambda scene, restitution: changed(scene, floor={"restitution": restitution})),
             applies=lambda scene: scene.floor is not None and scene.floor.restitution < 1.0,
             between=restitution_between, coordinate=lambda restitution: -math.log(1.0 - restitution),
         ),
-        Axis("duration", "s", durations, lambda nominal: nominal.scene.duration, to.with_duration),
+        Axis("duration", "s", durations, lambda nominal: nominal.scene.duration, to.of_scene(changed)),
         Axis(
-            "size", "m", sizes, lambda nominal: nominal.scene.body.size, to.with_size,
+            "size", "m", sizes, lambda nominal: nominal.scene.body.size, to.of_scene(with_size),
             applies=lambda scene: scene.floor is not None, between=whole_power_between(4.0),
         ),
         Axis(

@@ -1,6 +1,7 @@
 """An operating point: a scene and a time step, its characteristic times, and variations that change one quantity and keep the others."""
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +50,11 @@ def falls(scene: Scenario) -> bool:
     return scene.starts_above_floor and bool(scene.acceleration[1] < 0.0)
 
 
+def of_scene(change: Callable[[Scenario, float], Scenario]) -> Callable[["OperatingPoint", float], "OperatingPoint"]:
+    """The operating points whose scene is changed by a value, at the same time step."""
+    return lambda nominal, value: nominal._replace(scene=change(nominal.scene, value))
+
+
 def with_step(nominal: OperatingPoint, dt: float) -> OperatingPoint:
     """Another time step [s]; the scene lasts at least `LEAST_STEPS` steps."""
     return OperatingPoint(changed(nominal.scene, max(nominal.scene.duration, LEAST_STEPS * dt)), dt)
@@ -68,31 +74,6 @@ def with_height(nominal: OperatingPoint, height: float) -> OperatingPoint:
     higher = variations.with_height(scene, height)
     duration = scene.duration * fall_time(higher) / fall_time(scene)
     return OperatingPoint(changed(higher, max(duration, LEAST_STEPS * nominal.dt)), nominal.dt)
-
-
-def with_inertia_ratio(nominal: OperatingPoint, ratio: float) -> OperatingPoint:
-    """Another ratio of the largest to the least moment of inertia, for the same shape and largest moment."""
-    return OperatingPoint(variations.with_inertia_ratio(nominal.scene, ratio), nominal.dt)
-
-
-def with_mass(nominal: OperatingPoint, mass: float) -> OperatingPoint:
-    """Another mass [kg], and moments of inertia in proportion."""
-    return OperatingPoint(in_units(nominal.scene, mass=mass / nominal.scene.body.mass), nominal.dt)
-
-
-def with_restitution(nominal: OperatingPoint, restitution: float) -> OperatingPoint:
-    """Another restitution of the floor."""
-    return OperatingPoint(changed(nominal.scene, floor={"restitution": restitution}), nominal.dt)
-
-
-def with_duration(nominal: OperatingPoint, duration: float) -> OperatingPoint:
-    """Another duration [s]."""
-    return OperatingPoint(changed(nominal.scene, duration), nominal.dt)
-
-
-def with_size(nominal: OperatingPoint, size: float) -> OperatingPoint:
-    """Another size of the body [m], at the same height above the floor."""
-    return OperatingPoint(variations.with_size(nominal.scene, size), nominal.dt)
 
 
 def with_scale(nominal: OperatingPoint, factor: float) -> OperatingPoint:

@@ -93,29 +93,6 @@ def test_notebook_shows_status_and_leading_error_of_each_engine():
         found.leading_errors("spin-principle")
 
 
-def test_summary_has_a_line_for_each_engine():
-    """Counts of checks, and the scenes with model errors."""
-    found = ds.run(["spin-asymmetric", "fall-spin"], ["wang", "mujoco"], dt=[8e-3, 4e-3, 2e-3])
-    lines = dict(line.split(": ", 1) for line in found.summary().splitlines())
-    assert tuple(lines) == found.engines
-    for engine, line in lines.items():
-        mine = found.table[found.table["engine"] == engine]
-        counts = mine["verdict"].value_counts()
-        assert line.startswith(f"{counts['passed']} checks passed, {counts.get('failed', 0)} failed")
-        models = mine[(mine["kind"] == "asymptotic_error") & (mine["cause"] == "model") & (mine["value"].abs() > 1e-4)]
-        named = line.partition("model errors in ")[2].rstrip(".")
-        assert (named.split(", ") if named else []) == list(models["scene"].unique())
-    assert lines["wang"].endswith("; model errors in spin-asymmetric.")
-    assert "model errors" not in lines["mujoco"]
-
-
-def test_summary_counts_breakdowns(results):
-    broken = results.table.assign(verdict="crashed")
-    assert (
-        type(results)(broken, results.scenes, results.engines, {}).summary() == f"mujoco: 0 checks passed, 0 failed; {len(broken)} crashed."
-    )
-
-
 def test_a_trajectory_as_a_table(results):
     """A column for each component, the time as index."""
     motion = ds.simulate("drop-ball", "mujoco", dt=1e-2)

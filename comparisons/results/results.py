@@ -30,6 +30,8 @@ PARTS = ("angular_momentum_direction_error",)
 """Metrics that another metric contains."""
 UNDECIDED = "partly undecided"
 """The status of an engine that passes in a scene, but of which the time steps leave errors undecided."""
+COUNTED = ("known", "diverged", "crashed", "timed_out", "declined")
+"""Verdicts that a title counts beside passed and failed checks."""
 MOST_NAMES = 4
 """Scenes or engines that a title names; of more it has the number."""
 MOST_ROWS = 60
@@ -112,7 +114,10 @@ class Results:
             for names, kind in ((self.scenes, "scenes"), (self.engines, "engines"))
         )
         steps = ", ".join(f"{1e3 * dt:.3g}" for dt in sorted(self.table["dt"].dropna().unique(), reverse=True))
-        return f"{scenes} with {engines} at dt = {steps} ms: {_counted(self.table['verdict'])}"
+        counts = self.table["verdict"].value_counts()
+        others = [f"{counts[one]} {one.replace('_', ' ')}" for one in COUNTED if one in counts]
+        checks = f"{counts.get('passed', 0)} checks passed, {sum(counts.get(one, 0) for one in FAILURES)} failed"
+        return f"{scenes} with {engines} at dt = {steps} ms: {'; '.join([checks, *others])}"
 
     def statuses(self) -> dict[str, dict[str, Status]]:
         """The status of each engine in each scene.
@@ -171,16 +176,6 @@ class Results:
             return ""
         return str(findings["metric"].iloc[int(np.argmax(relative_sizes(findings, self.scenes)))])
 
-    def summary(self) -> str:
-        """A line for each engine: how many checks passed and failed, how many runs broke down, and the scenes with model errors."""
-        errors, lines = self.asymptotic_errors("model"), []
-        for engine in self.engines:
-            counts = _counted(self.table.loc[self.table["engine"] == engine, "verdict"])
-            scenes = errors.loc[(errors["engine"] == engine) & (errors["value"].abs() > SMALLEST_STATED), "scene"].unique()
-            named = f"; model errors in {', '.join(scenes)}" if len(scenes) else ""
-            lines.append(f"{engine}: {counts}{named}.")
-        return "\n".join(lines)
-
     @property
     def measurements(self) -> pd.DataFrame:
         """The rows that compare an engine with exact solutions and conservation laws, at one time step each."""
@@ -236,15 +231,6 @@ def _status(worst: str, of_model: bool, studied: bool, undecided: bool) -> Statu
     if worst in ("passed", "measured") and studied:
         return Status(worst, UNDECIDED if undecided else "converges")
     return Status(worst, STATUS_WORDS.get(worst, worst))
-
-
-def _counted(verdicts: "pd.Series[str]") -> str:
-    """How many checks passed and failed, and how many other verdicts that matter there are."""
-    counts = verdicts.value_counts()
-    others = [
-        f"{counts[one]} {one.replace('_', ' ')}" for one in ("known", "diverged", "crashed", "timed_out", "declined") if one in counts
-    ]
-    return "; ".join([f"{counts.get('passed', 0)} checks passed, {sum(counts.get(one, 0) for one in FAILURES)} failed", *others])
 
 
 def joined(parts: Sequence[Results], provenance: Mapping[str, Any]) -> Results:

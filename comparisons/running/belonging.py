@@ -115,10 +115,6 @@ def _of_states(scene: Scenario, truth: Truth | None, motion: Trajectory) -> Iter
     early = (dt + lag) * max(float(np.linalg.norm(scene.acceleration)), float(np.linalg.norm(scene.start.angular_velocity)) ** 2)
     off = _difference(scene, found[:1], scene.initial_state[None])
     if off > AT_START + early / (_speed(scene, exact) or 1.0):
-        late = _late_by(scene, truth, found[0])
-        if late is not None:
-            yield f"it begins {late:.4g} s after the scene's start; give the states from the start on"
-            return
         own, other = (
             f"{_listed(state[POSITION])} m with velocity {_listed(state[VELOCITY])} m/s" for state in (found[0], scene.initial_state)
         )
@@ -126,19 +122,6 @@ def _of_states(scene: Scenario, truth: Truth | None, motion: Trajectory) -> Iter
             f", turned by {float(angle_between_orientations(found[:1, ORIENTATION], scene.initial_state[None, ORIENTATION])[0]):.3g} rad"
         )
         yield f"it begins at {own}, the scene at {other}{turned}; give the motion of this scene, or a scene with this start"
-
-
-def _late_by(scene: Scenario, truth: Truth | None, state: Array) -> float | None:
-    """The time [s] at which the exact solution has a state; None if it never has."""
-    if truth is None:
-        return None
-    times = np.linspace(0.0, min(scene.duration, truth.horizon), LONGEST)
-    for _ in range(3):
-        states = truth(times).states
-        off = np.array([_difference(scene, state[None], other[None]) for other in states])
-        best = int(np.argmin(off))
-        times = np.linspace(times[max(best - 1, 0)], times[min(best + 1, len(times) - 1)], LONGEST // 40)
-    return float(times[len(times) // 2]) if off.min() <= AT_START else None
 
 
 def _speed(scene: Scenario, exact: Array) -> float:

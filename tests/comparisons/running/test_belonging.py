@@ -49,7 +49,7 @@ MISMATCHES = {
         with_part(1, lambda y: y + 0.01),
         "it begins at (0, 1.11, 0) m with velocity (0, 0, 0) m/s, the scene at (0, 1.1, 0) m",
     ),
-    "late": (BALL, lambda t, rows: (t[:-100], rows[100:]), "it begins 0.1 s after the scene's start; give the states from the start on"),
+    "late": (BALL, lambda t, rows: (t[:-100], rows[100:]), "it begins at (0, 1.051, 0) m with velocity (0, -0.98, 0) m/s"),
     "late times": (BALL, lambda t, rows: (t[100:], rows[100:]), "the times begin at 0.1 s; give the motion from the scene's start on"),
     "milliseconds": (BALL, lambda t, rows: (1e3 * t, rows), "the times appear to be in ms"),
     "microseconds": (FLIGHT.model_copy(update={"start": BALL.start.model_copy(update={"velocity": (1.0, 0.0, 0.0)})}), None, "µs"),

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.running.entries import present_entry
@@ -19,8 +18,8 @@ from dropspin.comparisons.running.recording import Breakdown, verify_accepted
 from dropspin.comparisons.running.start_phases import START_PHASES
 from dropspin.comparisons.running.verification import verified_settings
 from dropspin.scenarios import DropspinError, Scenario, load
+from dropspin.scenarios.state import Array
 
-Array = NDArray[np.float64]
 Motion = Callable[[float, int, float], tuple[list[float], list[float]]]
 """A function of the height of a fall [m], the number of steps and the time step [s], that returns heights of the lowest point [m] and
 vertical speeds [m/s].

@@ -17,10 +17,8 @@ from typing import Any
 
 import llvmlite
 import numba
-import numpy as np
 from numba import njit
 from numba.core import config as numba_config
-from numpy.typing import NDArray
 
 from dropspin.reference_impl import sources
 from dropspin.reference_impl.methods import COLLIDE, LAWS, ROTATIONS, Methods
@@ -39,7 +37,6 @@ from dropspin.reference_impl.parameters import (
 from dropspin.reference_impl.step import advance
 from dropspin.reference_impl.vectors import compiled
 
-Array = NDArray[np.float64]
 config: Any = numba_config  # numba sets its attributes at run time, which its type hints do not know
 COMPILER_SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "CPU_NAME", "CPU_FEATURES", "ENABLE_AVX", "DEBUGINFO_DEFAULT")
 MAX_CACHE_FOLDERS = 8

@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dropspin.reference_impl.body import Body, Floor, KernelBody, KernelDamping, KernelWall, Wall, World
+from dropspin.reference_impl.body import Array, Body, Floor, KernelBody, KernelDamping, KernelWall, Wall, World
 from dropspin.reference_impl.quaternion import from_matrix
 from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, compiled
 
-Array = NDArray[np.float64]
 Test = Callable[[Array], NDArray[np.bool_]]
 
 # The first column of each quantity: `pack` writes them in the order of `_quantities`, then what follows from them, then the walls.

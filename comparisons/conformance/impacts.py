@@ -27,13 +27,11 @@ from dropspin.comparisons.running.recording import Breakdown, record, try_record
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.loading import from_mapping, read_toml
 from dropspin.scenarios.rotations import rotate
-from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.text import counted, rounded
 from dropspin.scenarios.truths.impact_laws import LAWS, response_of, velocities_after
 from dropspin.scenarios.variations import with_height
-
-Array = NDArray[np.float64]
 
 CLOSE = 5e-3
 """The largest difference of an explained change of the velocities, relative to that change; gravity acts before or after an impact."""

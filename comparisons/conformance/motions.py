@@ -12,7 +12,6 @@ from functools import cache
 from itertools import chain, combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.conformance.impacts import OF_NOTE, PECULIARITIES, decaying_restitution, explain_impact
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
@@ -26,11 +25,9 @@ from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.running.recording import Breakdown, record, try_record
 from dropspin.scenarios import Scenario, Trajectory, truth_for
-from dropspin.scenarios.state import RATES, SPIN, VELOCITY
+from dropspin.scenarios.state import RATES, SPIN, VELOCITY, Array
 from dropspin.scenarios.text import rounded
 from dropspin.scenarios.truths import LAWS, Law
-
-Array = NDArray[np.float64]
 
 Fault = FaultModel | Mistake
 SINGLY: tuple[Fault, ...] = (*(fault for fault in FAULT_MODELS if fault.about != "start"), *SHAPE_FAULTS, *MISTAKES)

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.conformance.outcomes import Declined
 from dropspin.comparisons.engines.base import Engine
@@ -13,9 +12,7 @@ from dropspin.comparisons.running.recording import record
 from dropspin.scenarios import Scenario, Trajectory, Truth, truth_for
 from dropspin.scenarios.loading import from_mapping, read_toml
 from dropspin.scenarios.rotations import angle_between_orientations
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 
 FILE = Path(__file__).with_name("probes.toml")
 DT = 2.5e-4

@@ -10,7 +10,6 @@ import tempfile
 from contextlib import chdir
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.conformance.motions import explain_start
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted, described
@@ -18,8 +17,7 @@ from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, FLIGHTS, PR
 from dropspin.comparisons.engines.base import Diverged, Engine
 from dropspin.comparisons.running.verification import MULTIPLE, BuildMismatch, verified_claims, verified_record, verify_build, verify_start
 from dropspin.scenarios import Scenario, load, names
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 SEVERAL = 3
 ROUNDING = 1e-9

@@ -10,7 +10,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
 from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, FLIGHTS, RICHEST, accepted_scene
@@ -25,10 +24,9 @@ from dropspin.comparisons.running.verification import BuildMismatch, verified_ba
 from dropspin.comparisons.symmetries.findings import STEP_MULTIPLE, Finding, judged
 from dropspin.comparisons.symmetries.study import batch_member, effects_of_rounding, findings_of
 from dropspin.scenarios import Scenario
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.text import counted
 from dropspin.scenarios.variations import whole_steps
-
-Array = NDArray[np.float64]
 
 WITH_FRICTION = ("slippery floor", "sliding box")
 """Names of probes with a coefficient of friction."""

@@ -8,7 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial.polynomial import polyfit, polyval
-from numpy.typing import NDArray
 
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
 from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, accepted_scene, exact_solution, few_steps, recorded, state_after
@@ -17,10 +16,8 @@ from dropspin.comparisons.engines.base import Engine, Simulation
 from dropspin.comparisons.running.timing import time_steps
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import angle_between_orientations
-from dropspin.scenarios.state import ORIENTATION, POSITION, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, POSITION, VELOCITY, Array
 from dropspin.scenarios.text import rounded
-
-Array = NDArray[np.float64]
 
 STEPS_TRIED = (0.01, 0.0025, 0.00025)
 NEAR_ENOUGH = 0.02

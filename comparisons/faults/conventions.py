@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.faults.fault_model import (
     Change,
@@ -15,9 +14,7 @@ from dropspin.comparisons.faults.fault_model import (
 )
 from dropspin.scenarios.rotations import about as rotation_about
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
-from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, RATES, SPIN, VELOCITY
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, RATES, SPIN, VELOCITY, Array
 
 
 def _convention(part: slice, fault: str, expected: str, wrong: Change, right: Change) -> Iterator[FaultModel]:

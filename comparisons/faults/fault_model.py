@@ -5,13 +5,11 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios import DropspinError, Scenario, truth_for
-from dropspin.scenarios.state import ORIENTATION
+from dropspin.scenarios.state import ORIENTATION, Array
 from dropspin.scenarios.variations import with_values
 
-Array = NDArray[np.float64]
 Simulated = Callable[[Scenario], Scenario]
 """From the scene given to an adapter to the one that it simulates."""
 Reported = Callable[[Array], Array]

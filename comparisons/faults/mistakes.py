@@ -11,13 +11,10 @@ from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import cross, multiply, rotate, unrotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 
 NOT_ROTATED = "the inertia is not rotated into the world frame: there it is R I Rᵀ, and its inverse R I⁻¹ Rᵀ"
 ROTATED_BACK = "the inertia is rotated in the wrong direction: in the world frame it is R I Rᵀ, not Rᵀ I R"

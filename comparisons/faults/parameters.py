@@ -4,7 +4,6 @@ from collections.abc import Callable
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.faults.conventions import CONVENTIONS
 from dropspin.comparisons.faults.fault_model import FaultModel, Simulated, changed_table
@@ -12,9 +11,8 @@ from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box, Ellipsoid
 from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.model import Gravity
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.variations import with_values
-
-Array = NDArray[np.float64]
 
 ORDERS = {order: ", ".join("xyz"[axis] for axis in order) for order in permutations(range(3)) if order != (0, 1, 2)}
 """Other orders of the axes, and their names."""

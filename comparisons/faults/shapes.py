@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from dropspin.comparisons.faults.fault_model import Array, FaultModel, Reported, Simulated, changed_part, changed_start
+from dropspin.comparisons.faults.fault_model import FaultModel, Reported, Simulated, changed_part, changed_start
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.bodies import Body, Capsule, Cylinder, Ellipsoid, Mesh, OnAxis, Shape
 from dropspin.scenarios.rotations import about, conjugate, multiply
-from dropspin.scenarios.state import ORIENTATION
+from dropspin.scenarios.state import ORIENTATION, Array
 from dropspin.scenarios.variations import with_values
 
 BODY: TypeAdapter[Any] = TypeAdapter(Body)

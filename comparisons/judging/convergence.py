@@ -17,8 +17,7 @@ from dropspin.comparisons.measuring.comparison import Unresolved
 from dropspin.comparisons.measuring.metric import Average, Metric
 from dropspin.comparisons.measuring.tolerances import negligible, rounding
 from dropspin.scenarios import Scenario
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 STUDIES = ("order", "asymptotic_error")
 """Kinds of measurements that are computed from several time steps."""

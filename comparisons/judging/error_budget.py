@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dropspin.comparisons.judging.extrapolation import CREDIBLE, ORDERS, Posterior, extrapolate
 from dropspin.comparisons.judging.series import (
@@ -37,9 +37,8 @@ from dropspin.comparisons.judging.series import (
     verify_options,
 )
 from dropspin.comparisons.judging.verdicts import Cause
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.text import counted
-
-Array = NDArray[np.float64]
 
 SHARE_OF_COARSEST = 1.0 / 64.0
 """Factor by which an error of third order falls over three halved time steps."""

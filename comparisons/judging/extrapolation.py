@@ -27,8 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.judging.mixtures import quantiles, student_t
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 ORDERS = np.arange(0.5, 6.01, 0.5)
 """Possible orders of the leading term."""

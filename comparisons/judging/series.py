@@ -4,12 +4,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dropspin.comparisons.judging.extrapolation import ORDERS
 from dropspin.scenarios import DropspinError
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 FEWEST_TIME_STEPS = 3
 MOST_TIME_STEPS = 5

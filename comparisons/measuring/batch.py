@@ -15,9 +15,10 @@ from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.contacts import contact_residuals
 from dropspin.comparisons.measuring.motions import Motions, RowNumbers, Setup
 from dropspin.comparisons.measuring.requirements import obeys_contact_laws
-from dropspin.comparisons.measuring.states import Array, Mask, States, StatesOfMany, is_touching
+from dropspin.comparisons.measuring.states import Mask, States, StatesOfMany, is_touching
 from dropspin.scenarios import Scenario, Trajectory, mechanics
 from dropspin.scenarios.mechanics import depth_of, energy_of, kinetic_energy_of, offset_of
+from dropspin.scenarios.state import Array
 
 BATCH_BYTES = 8 * 2**20
 """States that are held in memory at a time; more would not be faster."""

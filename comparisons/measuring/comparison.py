@@ -22,8 +22,8 @@ from dropspin.scenarios import Scenario, Trajectory, Truth
 from dropspin.scenarios.mechanics import apex
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.rotations import cross
+from dropspin.scenarios.state import Array
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 SHORTEST_FLIGHT = 16  # steps; a shorter flight is not resolved, and not judged

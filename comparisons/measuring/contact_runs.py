@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
+
 Mask = NDArray[np.bool_]
 RowNumbers = NDArray[np.intp]
 

@@ -30,12 +30,11 @@ from dropspin.comparisons.measuring.motions import Motions
 from dropspin.scenarios import DropspinError, Scenario, Trajectory
 from dropspin.scenarios.mechanics import angular_momentum
 from dropspin.scenarios.rotations import cross, length
-from dropspin.scenarios.state import UP
+from dropspin.scenarios.state import UP, Array
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 RESIDUALS = ("pull", "cone_excess", "push", "gap")
 """The laws of contact, by the name of their violation."""

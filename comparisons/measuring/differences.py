@@ -3,13 +3,10 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import angle_between_orientations
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 
 
 def differences(scene: Scenario, first: Array, second: Array) -> Array:

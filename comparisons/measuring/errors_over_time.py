@@ -2,13 +2,10 @@
 
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.scenarios.rotations import angle_between_orientations, angle_between_vectors, length, rotation_vector
+from dropspin.scenarios.state import Array
 
-Array = NDArray[np.float64]
 Rows = slice | list[int]
 ALL = slice(None)
 

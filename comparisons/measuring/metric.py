@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.scenarios import Scenario, Truth
+from dropspin.scenarios.state import Array
 
-Array = NDArray[np.float64]
 Measure = Callable[[Comparison], float | Array]
 Components = Callable[[Comparison], Array]
 Applies = Callable[[Scenario, Truth | None], bool]

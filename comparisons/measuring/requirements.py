@@ -1,13 +1,10 @@
 """Requirements of metrics: whether a scene has what a metric needs. The first line of a docstring says what is needed."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios import Scenario, Trajectory, Truth
 from dropspin.scenarios.mechanics import kinetic_energy
-from dropspin.scenarios.state import RATES, SPIN
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import RATES, SPIN, Array
 
 
 def has_truth(scene: Scenario, truth: Truth | None) -> bool:

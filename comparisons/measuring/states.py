@@ -11,8 +11,8 @@ from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.mechanics import Components, angular_momentum, energy, kinetic_energy, lowest_height, scalar_product
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.rotations import length
+from dropspin.scenarios.state import Array
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 

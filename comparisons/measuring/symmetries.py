@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import about, conjugate, turned_states
-from dropspin.scenarios.state import POSITION, UP, VELOCITY
+from dropspin.scenarios.state import POSITION, UP, VELOCITY, Array
 from dropspin.scenarios.variations import (
     AWAY,
     REFLECTED,
@@ -24,8 +23,6 @@ from dropspin.scenarios.variations import (
     with_next_axes,
     with_previous_axes,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios import Scenario
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 NEGLIGIBLE = 3e-8
 """Errors below this, relative to the metric's scale, are attributed to rounding and to the residuals of iterative solvers."""

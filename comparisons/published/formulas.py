@@ -6,17 +6,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.published.results import EXACT, Agreement, Result, Status, agreement
 from dropspin.comparisons.published.sources import DATA, Source
 from dropspin.scenarios import Scenario, Truth, load, truth_for
 from dropspin.scenarios.mechanics import kinetic_energy
 from dropspin.scenarios.rotations import about, conjugate, rotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, Array
 from dropspin.scenarios.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 RATES = ("roll", "pitch", "yaw")
 DECIMALS = 12
 """Decimals to which formulas are compared, and of exact rates [deg/s]: measured rounding errors of both are below 3e-14."""

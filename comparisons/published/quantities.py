@@ -9,13 +9,12 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.mechanics import angular_momentum, energy, kinetic_energy
+from dropspin.scenarios.state import Array
 
-Array = NDArray[np.float64]
 Quantity = Callable[[Scenario, Trajectory], float]
 AT = re.compile(r"(height|speed) at ([\d.]+) s")
 BALLS = 49

@@ -3,10 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 SAMPLES = 41
 """Times at which an ensemble's energy is kept, the start and the end among them."""

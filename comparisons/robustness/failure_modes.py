@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metrics import metrics_for
@@ -16,8 +15,7 @@ from dropspin.scenarios import Scenario, Trajectory, Truth
 from dropspin.scenarios.mechanics import depth_of, lowest_height, offset_of
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.rotations import length
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 FailureMode = Literal["declined", "sound", "inaccurate", "gains_energy", "sinks", "tunnels", "clamped", "diverged", "crashed", "timed_out"]
 FAILURE_MODES: tuple[FailureMode, ...] = get_args(FailureMode)

@@ -5,12 +5,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios import Scenario, variations
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.variations import changed, in_units, units_of_states
-
-Array = NDArray[np.float64]
 
 LEAST_STEPS = 8
 """Smallest number of steps of a run."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring.differences import differences
 from dropspin.comparisons.robustness.axes import Axis
@@ -27,8 +26,6 @@ from dropspin.comparisons.running.recording import Breakdown, record, verify_acc
 from dropspin.comparisons.running.start_phases import MOST_ROWS, start_phases
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 from dropspin.scenarios.state import RATES
-
-Array = NDArray[np.float64]
 
 FEWEST_STEPS_WITHOUT_GRAVITY = 1000
 """Smallest number of steps of a run without gravity, to test its stability; with gravity, a longer run would be another motion."""

@@ -14,10 +14,8 @@ from dropspin.comparisons.faults.conventions import CONVENTIONS
 from dropspin.comparisons.faults.fault_model import unchanged_scene
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth
 from dropspin.scenarios.rotations import angle_between_orientations
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 from dropspin.scenarios.text import counted
-
-Array = NDArray[np.float64]
 
 UNEVEN = 0.01
 """Largest difference of a time step from the mean, as a share of it; times in text files are rounded."""

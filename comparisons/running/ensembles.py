@@ -7,7 +7,6 @@ two engines are taken start by start, so that what they have in common is not no
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Diverged, Engine
 from dropspin.comparisons.judging.verdicts import Judgement
@@ -18,8 +17,7 @@ from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, SAMPLES, En
 from dropspin.comparisons.running.recording import record_batch
 from dropspin.scenarios import Scenario, Trajectory, members
 from dropspin.scenarios.mechanics import angular_momentum
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 BATCH_SIZE = 32
 """Members whose every step is held in memory at a time."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Diverged, Engine, KnownLimitation
 from dropspin.comparisons.engines.exceptions import described, short
@@ -28,8 +27,6 @@ from dropspin.comparisons.running.verification import (
 )
 from dropspin.scenarios import DropspinError, Scenario, Trajectory
 from dropspin.scenarios.state import PARTS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(eq=False)

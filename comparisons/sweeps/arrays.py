@@ -27,11 +27,9 @@ from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.damping import MOTIONS
 from dropspin.scenarios.ensemble import clearances, spread_starts
 from dropspin.scenarios.model import TOUCHING
-from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, UP
+from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, UP, Array
 from dropspin.scenarios.tables import unit
 from dropspin.scenarios.variations import Path, path_of, set_field, with_fields
-
-Array = NDArray[np.float64]
 
 FRICTION = "floor.friction"
 ARRAY_FIELDS = {("floor", "restitution"), ("floor", "friction"), ("floor", "rest_speed"), ("damping", "linear"), ("damping", "angular")}

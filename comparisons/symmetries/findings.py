@@ -12,7 +12,6 @@ from typing import Annotated, Literal, get_args
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, Verdict
@@ -23,8 +22,8 @@ from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.table import Measurement, as_table
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import Scenario
+from dropspin.scenarios.state import Array
 
-Array = NDArray[np.float64]
 Effects = Callable[[], list[Array]]
 """A function that runs an engine from perturbed starts and returns the differences from its motion, each of shape (n,)."""
 Pairs = Sequence[tuple[Array, Array]]

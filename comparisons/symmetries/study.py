@@ -8,7 +8,6 @@ from functools import partial
 from itertools import chain, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.differences import differences
@@ -22,10 +21,8 @@ from dropspin.comparisons.running.recording import Breakdown, classify, finite, 
 from dropspin.comparisons.symmetries.findings import Effects, Finding, Pairs, judged, not_run
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import DropspinError, Scenario
-from dropspin.scenarios.state import POSITION, RATES
+from dropspin.scenarios.state import POSITION, RATES, Array
 from dropspin.scenarios.variations import AWAY, whole_steps, with_other_numbers
-
-Array = NDArray[np.float64]
 
 SCENES = ("spin-asymmetric", "drop-ball-backspin", "drop-box-anyhow", "drop-box-sticking", "roll-ball", "slide-box", "turn-box-rough")
 """A free rotation, a ball with backspin, boxes that strike a smooth and a rough floor, a rolling ball, a sliding and a turning box."""

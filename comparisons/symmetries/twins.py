@@ -24,8 +24,7 @@ from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.symmetries.findings import Finding, Status, judged
 from dropspin.comparisons.symmetries.study import DT, RESOURCES, effects_of_rounding, states_of
 from dropspin.scenarios import DropspinError, Scenario, Trajectory
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 LEVELS = (1e-12, 1e-9, 1e-6, 1e-3)
 """Differences whose first time steps are reported, of angles [rad] and relative to sizes and speeds."""

@@ -6,14 +6,12 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PlainSerializer, PlainValidator
 
 from dropspin.comparisons.tradeoff.costs import WORLDS
 from dropspin.comparisons.tradeoff.errors import Ladder
 from dropspin.scenarios import Scenario
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 
 def _costs(values: Any) -> Array:

@@ -4,7 +4,6 @@ Simulations are also independent: of what ran before, of each other, and of the 
 `state` and `record` themselves, because that is what they test.
 """
 
-import json
 import os
 import tempfile
 from contextlib import chdir
@@ -15,7 +14,16 @@ from dropspin.comparisons.conformance.motions import explain_start
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted, described
 from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, FLIGHTS, PROBES, accepted_scene, recorded, state_after
 from dropspin.comparisons.engines.base import Diverged, Engine
-from dropspin.comparisons.running.verification import MULTIPLE, BuildMismatch, verified_claims, verified_record, verify_build, verify_start
+from dropspin.comparisons.running.verification import (
+    MULTIPLE,
+    BuildMismatch,
+    verified_claims,
+    verified_record,
+    verified_refusal,
+    verified_settings,
+    verify_build,
+    verify_start,
+)
 from dropspin.scenarios import Scenario, load, names
 from dropspin.scenarios.state import Array
 
@@ -39,8 +47,7 @@ def check_refusals(engine: Engine) -> str:
         answer, again = engine.declines(scene), engine.declines(scene)
         if answer != again:
             raise CheckFailed(f"declines({scene.name}) returns {answer!r}, then {again!r}; it must return the same each time")
-        if not (answer is None or (isinstance(answer, str) and answer.strip())):
-            raise CheckFailed(f"declines({scene.name}) returns {answer!r}; it must return None, or the reason as a sentence")
+        verified_refusal(answer)
     declined = sum(engine.refusal(scene) is not None for scene in scenes)
     if declined == len(scenes):
         raise CheckFailed(f"every scene of the catalogue is declined; {scenes[0].name}: {engine.refusal(scenes[0])}")
@@ -160,11 +167,7 @@ def check_states(engine: Engine) -> str:
 def check_settings(engine: Engine) -> str:
     """Results can be stored with the settings."""
     with engine.prepare(accepted_scene(engine), DT) as simulation:
-        settings = simulation.settings
-    try:
-        json.dumps(dict(settings), allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise CheckFailed(f"settings cannot be written as JSON: {error}") from None
+        settings = verified_settings(simulation.settings)
     if "version" not in settings:
         raise Noted("settings has no 'version'; add the engine's version, with which results are stored")
     return f"version {settings['version']}, and {len(settings) - 1} other settings"

@@ -168,6 +168,6 @@ def test_energy_gained_in_a_contact_that_lasts_is_measured(factor):
     states[exact.t > 0.7, 7:10] *= factor
     motion = Trajectory.from_states(exact.t, states)
     energy = Comparison(scene, motion).states.energy
-    plain = (energy - np.minimum.accumulate(energy)).max() / float(Motions.of(scene, motion).states.energy_scale)
+    plain = (energy - np.minimum.accumulate(energy)).max() / float(Motions.of(scene, motion).energy_scale)
     assert plain > 1e-3
     assert measure(scene, motion)["energy_gain"] == plain

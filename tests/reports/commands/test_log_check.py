@@ -123,11 +123,7 @@ def test_many_findings_of_one_kind_are_shortened_on_a_terminal_alone():
 def test_help_of_log_lists_its_commands(tmp_path):
     helped = dropspin("log", "--help", cwd=tmp_path)
     assert helped.returncode == 0
-    assert re.findall(r"^  (\w+)  +(.*)\.$", helped.stdout, re.MULTILINE)[:3] == [
-        ("check", "Check a recording of tosses by their free flight"),
-        ("compare", "Compare engines with measured tosses"),
-        ("fit", "Find friction and restitution of measured tosses"),
-    ]
+    assert re.findall(r"^  (\w+)  +", helped.stdout, re.MULTILINE) == ["check", "compare", "fit"]
     alone = dropspin("log", cwd=tmp_path)
     assert (alone.returncode, alone.stderr) == (2, helped.stdout)
 

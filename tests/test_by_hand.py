@@ -12,6 +12,7 @@ PACKAGES = {
     "check_sapien.py": {"sapien"},
     "check_exudyn.py": {"exudyn"},
     "check_ode.py": {"odepy"},
+    "check_box3d.py": {"robox3d"},
     "check_jsbsim.py": {"jsbsim"},
     "check_genesis.py": {"genesis"},
     "check_newton.py": {"newton", "warp"},

@@ -1,4 +1,4 @@
-"""What the adapters of Rapier's Python and JavaScript packages share: the scenes that Rapier cannot reproduce, surfaces and damping."""
+"""What the adapters of Rapier and of engines that are like it share: the scenes that Rapier cannot reproduce, surfaces and damping."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ WHY_DAMPING = "(exp(rate dt) - 1)/dt: Rapier divides by 1 + c dt, which gives th
 
 
 def refusal(scene: Scenario, kind: str, engine: str = "Rapier") -> str | None:
-    """Why Rapier, or Havok, cannot reproduce a scene on a floor of a kind, `plane`, `box` or `mesh`; None if it can."""
+    """Why Rapier, Havok or Box3D cannot reproduce a scene on a floor of a kind, `plane`, `box` or `mesh`; None if it can."""
     body, floor = scene.body, scene.floor
     unfit = mapping.refusal_of_floor(scene, kind) or mapping.refusal_of_rest_speed(scene, engine)
     if unfit is not None or floor is None or floor.restitution == 0.0:

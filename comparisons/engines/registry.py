@@ -46,6 +46,7 @@ BUILT_IN = {"wang": _Home(f"{FOLDER}.wang", "Wang")} | {
         ("havok", "Havok", HAVOK, f"npm install {HAVOK}", WHERE),
         ("dart", "Dart", "dartpy"),
         ("drake", "Drake", "pydrake"),
+        ("box3d", "Box3D", "robox3d"),
         ("ode", "ODE", "odepy", "pip install 'dropspin[ode]'", LIBRARY),
         ("sapien", "Sapien", "sapien"),
         ("exudyn", "Exudyn", "exudyn"),

@@ -22,7 +22,19 @@ from dropspin.scenarios.text import printable
 MEASURING = ("dropspin", "numpy", "numba", "scipy")
 ENGINES = (
     *("mujoco", "pybullet", "rapier3d", "@dimforge/rapier3d-compat", "dartpy", "drake"),
-    *("cannon-es", "jolt-physics", "@babylonjs/havok", "ode-python", "sapien", "exudyn", "jsbsim", "genesis-world", "quadrants", "torch"),
+    *(
+        "cannon-es",
+        "jolt-physics",
+        "@babylonjs/havok",
+        "robox3d",
+        "ode-python",
+        "sapien",
+        "exudyn",
+        "jsbsim",
+        "genesis-world",
+        "quadrants",
+        "torch",
+    ),
     *("mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang"),
 )
 STAMPED = (*MEASURING, *ENGINES)

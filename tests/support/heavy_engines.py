@@ -45,6 +45,7 @@ CASES = {
     "cannon-es": [Case("cannon-es", 0.142, 1e-9, batch=None)],
     "jolt": [Case("jolt", 2.75e-4, 1e-6, batch=None)],
     "havok": [Case("havok", 0.142, 5e-3, batch=None)],
+    "box3d": [Case("box3d", 7.2e-5, 1e-6, batch=None)],
     "ode": [Case("ode", 6.56e-4, 1e-6, batch=None)],
     "sapien": [Case("sapien", 2.8e-4, 2.5e-3, batch=None)],
 }

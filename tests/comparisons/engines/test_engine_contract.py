@@ -203,6 +203,7 @@ def test_labels_are_canonical_and_unknown_options_get_suggestions():
         "havok",
         "dart",
         "drake",
+        "box3d",
         "ode",
         "sapien",
         "exudyn",

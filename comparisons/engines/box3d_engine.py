@@ -1,0 +1,107 @@
+"""The engine `box3d`: a rigid body of Box3D, in the library that comes with the package robox3d; in single precision."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+from robox3d._ffi import ffi, lib
+
+from dropspin.comparisons.engines import mapping
+from dropspin.comparisons.engines.base import Array, AsBuilt, Engine, Simulation
+from dropspin.comparisons.engines.packages import version
+from dropspin.comparisons.engines.rapier_scenes import GRIPPING, WHY_DAMPING, damping_of, refusal, surface_of
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.bodies import Sphere
+from dropspin.scenarios.state import PARTS
+
+SUBSTEPS = 4
+WORLD = {
+    "restitutionThreshold": (0.0, "m/s, 1 by default"),
+    "maximumLinearSpeed": (1e15, "m/s, 400 by default"),
+}
+BODY = {
+    "enableSleep": (False, "never falls asleep; by default below 0.05 m/s"),
+    "allowFastRotation": (True, "no limit of the spin"),
+    "enableContactRecycling": (False, "contacts are found anew in each step; else a rocking block errs by 3.9 cm, not 8 mm"),
+}
+REASONS = {name: why for name, (_, why) in (WORLD | BODY).items()} | {
+    "substeps": "Box3D's examples take as many",
+    "linearDamping": f"{WHY_DAMPING.replace('Rapier', 'Box3D')}, with the substep for dt; angularDamping is the same",
+    "friction": f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution",
+}
+
+
+class Box3D(Engine):
+    """A rigid body of Box3D on a box."""
+
+    name, order, precision, reasons = "box3d", 1.0, np.float32, REASONS
+    shapes: ClassVar = ("sphere", "box")
+    choices: ClassVar = {"profile": mapping.PROFILES, "beside": mapping.BESIDE}
+    representations: ClassVar = ("beside",)
+
+    def declines(self, scene: Scenario) -> str | None:
+        return refusal(scene, "box", "Box3D")
+
+    def prepare(self, scene: Scenario, dt: float) -> Simulation:
+        return Box3DSimulation(scene, dt, self)
+
+
+class Box3DSimulation(Simulation):
+    """A world of Box3D."""
+
+    def __init__(self, scene: Scenario, dt: float, engine: Box3D) -> None:
+        self._dt, self.velocity_lag = dt, 0.5 * dt / SUBSTEPS
+        world, self._made, self._surface = lib.b3DefaultWorldDef(), lib.b3DefaultBodyDef(), surface_of(scene)
+        chosen = [{} if engine.is_default else {name: value for name, (value, _) in made.items()} for made in (WORLD, BODY)]
+        chosen[1] |= {f"{motion}Damping": rate for motion, rate in damping_of(scene, dt / SUBSTEPS).items()}
+        for made, values in zip((world, self._made), chosen, strict=True):
+            for name, value in values.items():
+                setattr(made, name, value)
+        world.gravity = tuple(scene.acceleration)
+        self._world, half = lib.b3CreateWorld(ffi.addressof(world)), mapping.FLOOR_HALF_SIZE
+        if scene.floor:
+            floor = lib.b3DefaultBodyDef()
+            floor.position = (0.0, -half, 0.0)
+            self._add_shape(lib.b3CreateBody(self._world, ffi.addressof(floor)), (half, half, half))
+        self._body, *_ = [self._add(one) for one in mapping.bodies_in(scene, engine.option("beside"))]
+        options = {name: engine.option(name) for name in engine.choices}
+        library = ".".join(str(getattr(lib.b3GetVersion(), part)) for part in ("major", "minor", "revision"))
+        given = {"version": version("robox3d"), "library": library, **options, "substeps": SUBSTEPS}
+        self.settings = given | chosen[0] | chosen[1] | self._surface
+
+    def _add_shape(self, body: Any, size: float | tuple[float, ...]) -> None:
+        """Add a ball of a radius, or a box of half extents."""
+        made = lib.b3DefaultShapeDef()
+        made.baseMaterial.friction, made.baseMaterial.restitution = self._surface["friction"], self._surface["restitution"]
+        if isinstance(size, tuple):
+            hull = lib.b3MakeBoxHull(*size)
+            lib.b3CreateHullShape(body, ffi.addressof(made), ffi.addressof(hull, "base"))
+        else:
+            lib.b3CreateSphereShape(body, ffi.addressof(made), ffi.new("b3Sphere*", {"radius": size}))
+
+    def _add(self, scene: Scenario) -> Any:
+        x, q, v, w = (tuple(scene.initial_state[part]) for part in PARTS.values())
+        self._made.type, self._made.position, self._made.rotation = lib.b3_dynamicBody, x, {"v": q[:3], "s": q[3]}
+        self._made.linearVelocity, self._made.angularVelocity = v, w
+        handle, body = lib.b3CreateBody(self._world, ffi.addressof(self._made)), scene.body
+        if scene.floor:
+            self._add_shape(handle, body.size if isinstance(body, Sphere) else tuple(body.vertices.max(0)))
+        columns = dict(zip(("cx", "cy", "cz"), map(tuple, body.inertia_tensor), strict=True))
+        lib.b3Body_SetMassData(handle, {"mass": body.mass, "center": (0.0, 0.0, 0.0), "inertia": columns})
+        return handle
+
+    def advance(self, steps: int) -> None:
+        for _ in range(steps):
+            lib.b3World_Step(self._world, self._dt, SUBSTEPS)
+
+    def state(self) -> Array:
+        x, q = lib.b3Body_GetPosition(self._body), lib.b3Body_GetRotation(self._body)
+        v, w = lib.b3Body_GetLinearVelocity(self._body), lib.b3Body_GetAngularVelocity(self._body)
+        return np.array([x.x, x.y, x.z, q.v.x, q.v.y, q.v.z, q.s, v.x, v.y, v.z, w.x, w.y, w.z])
+
+    def as_built(self) -> AsBuilt:
+        mass, gravity = lib.b3Body_GetMassData(self._body), lib.b3World_GetGravity(self._world)
+        columns = (mass.inertia.cx, mass.inertia.cy, mass.inertia.cz)
+        return AsBuilt(mass.mass, np.array([[c.x, c.y, c.z] for c in columns]), np.array([gravity.x, gravity.y, gravity.z]))
+
+    def close(self) -> None:
+        lib.b3DestroyWorld(self._world)

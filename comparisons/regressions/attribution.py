@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from dropspin.comparisons.engines.options import engine_name
+from dropspin.comparisons.engines.options import engine_name, spelled
 from dropspin.comparisons.engines.registry import BUILT_IN
 from dropspin.comparisons.regressions.changes import Motion
 from dropspin.comparisons.results.provenance import MEASURING
@@ -12,6 +12,12 @@ from dropspin.scenarios.text import printable
 
 Stamp = Mapping[str, Any]
 Origin = Literal["engine", "adapter", "settings", "dropspin", "surroundings", "either", "absent", "nothing"]
+ACCEPTED = "accepted"
+"""The case of the settings that are stored with accepted results."""
+VERSIONS = frozenset({"version", "numba"})
+"""What is among the settings and is none."""
+LONGEST = 100
+"""Characters of a setting that is stored with accepted results."""
 OWN_CODE = "dropspin's own code"
 OF_DROPSPIN = frozenset({"dropspin", "code"})
 """The differences of the surroundings that are dropspin's."""
@@ -50,6 +56,36 @@ def surroundings(old: Stamp, new: Stamp) -> dict[str, str]:
     return {key: word if key == "code" else f"{word} {one} → {other}" for key, (word, one, other) in differing.items()}
 
 
+def common_settings(stamp: Stamp, engine: str) -> dict[str, str]:
+    """The settings that are the same in all cases of an engine, as text, but for long ones."""
+    cases = [{name: _text(value) for name, value in case.items()} for case in stamp["settings"].get(engine, {}).values()]
+    names = [name for name in (cases[0] if cases else {}) if name not in VERSIONS]
+    return {
+        name: cases[0][name] for name in names if len(cases[0][name]) <= LONGEST and all(case.get(name) == cases[0][name] for case in cases)
+    }
+
+
+def changed_settings(old: Stamp, new: Stamp, engine: str) -> dict[str, str]:
+    """The settings of an engine that differ between two runs in the same case, with their earlier values, empty for none.
+
+    Of accepted results those are known that were the same in all cases.
+    """
+    before, after = (stamp["settings"].get(engine, {}) for stamp in (old, new))
+    pairs = [(before[case], after[case]) for case in before if case in after]
+    if ACCEPTED in before:
+        now = common_settings(new, engine)
+        both = now.keys() & before[ACCEPTED].keys()
+        pairs = [({name: before[ACCEPTED][name] for name in both}, {name: now[name] for name in now if name in both})]
+    texts = [[{name: _text(value) for name, value in case.items() if name not in VERSIONS} for case in pair] for pair in pairs]
+    return {name: was.get(name, "") for was, now in texts for name in {**was, **now} if was.get(name) != now.get(name)}
+
+
+def _text(value: Any) -> str:
+    """The value of a setting as an option has it, if it is one."""
+    plain = isinstance(value, str | int | float) or (isinstance(value, list) and all(isinstance(part, int | float) for part in value))
+    return printable(spelled(value) if plain else str(value))
+
+
 def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Origin, str]:
     """The differences of the engine itself, the most likely cause first."""
     found: dict[Origin, str] = {}
@@ -59,12 +95,8 @@ def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Origin, str]:
         found["engine"] = f"{name} {' → '.join(map(', '.join, versions))}"
     if engine in old["adapters"] and old["adapters"][engine] != new["adapters"].get(engine):
         found["adapter"] = f"the code of {name}'s adapter"
-    before, after = stamped
-    pairs = [(before[case], after[case]) for case in before if case in after]
-    settings = dict.fromkeys(setting for pair in pairs for given in pair for setting in given if setting not in ("version", "numba"))
-    changed = [printable(setting) for setting in settings if any(one.get(setting) != other.get(setting) for one, other in pairs)]
-    if changed:
-        found["settings"] = f"its settings ({', '.join(changed)})"
+    if changed := changed_settings(old, new, engine):
+        found["settings"] = f"its settings ({', '.join(map(printable, changed))})"
     return found
 
 

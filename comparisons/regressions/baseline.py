@@ -20,6 +20,7 @@ from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.judging.convergence import STUDIES
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.symmetries import kind_of
+from dropspin.comparisons.regressions.attribution import ACCEPTED
 from dropspin.comparisons.regressions.changes import KEY, Digests, leaves
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.folder import written_whole
@@ -55,13 +56,14 @@ HEADER = (
 
 
 class Acceptance(Table):
-    """The date, the reason and the versions of an acceptance, and the hashes of dropspin's code and of each adapter's."""
+    """The date, the reason and the versions of an acceptance, hashes of the code of dropspin and each adapter, settings of each engine."""
 
     date: datetime.date
     reason: Annotated[Text, Field(min_length=1)]
     versions: dict[Text, Text]
     code: Text | None = None
     adapters: dict[Text, Text] = Field(default_factory=dict)
+    settings: dict[Text, dict[Text, Text]] = Field(default_factory=dict)
 
     @property
     def key(self) -> str:
@@ -71,7 +73,7 @@ class Acceptance(Table):
     def stamp_of(self, engine: str) -> dict[str, Any]:
         """What it has of the provenance of the run, for `attribution.attribute`; baselines of earlier versions have no hashes of code."""
         version = self.versions.get(engine_name(engine))
-        settings = {engine: {"accepted": {} if version is None else {"version": version}}}
+        settings = {engine: {ACCEPTED: self.settings.get(engine, {}) | ({} if version is None else {"version": version})}}
         return self.model_dump() | {"python": self.versions.get("python"), "settings": settings}
 
 

@@ -15,7 +15,7 @@ import pandas as pd
 
 from dropspin.comparisons.judging.convergence import STUDIES
 from dropspin.comparisons.judging.verdicts import FAILURES, Verdict
-from dropspin.comparisons.regressions.attribution import CORRECTION, Attribution, attribute
+from dropspin.comparisons.regressions.attribution import CORRECTION, Attribution, attribute, common_settings
 from dropspin.comparisons.regressions.baseline import COLUMNS, Acceptance, Baseline
 from dropspin.comparisons.regressions.changes import (
     KEY,
@@ -99,7 +99,10 @@ def accept(
         kept["known_failure"] = flags.where(flags.notna(), kept["known_failure"]).astype(bool)
     stamp = results.provenance
     adapters = {engine: code for engine, code in stamp["adapters"].items() if code is not None and (measured["engine"] == engine).any()}
-    acceptance = Acceptance(date=date, reason=reason, versions=versions_behind(stamp), code=stamp["code"], adapters=adapters)
+    settings = {engine: common_settings(stamp, engine) for engine in adapters}
+    acceptance = Acceptance(
+        date=date, reason=reason, versions=versions_behind(stamp), code=stamp["code"], adapters=adapters, settings=settings
+    )
     moved = measured[~_keys(measured).isin(_keys(kept))].assign(by=acceptance.key)
     outside = earlier.results.drop(covered.index)
     table = pd.concat([outside[~_has_other_scene(outside, earlier, results)], kept, moved], ignore_index=True)[list(COLUMNS)]

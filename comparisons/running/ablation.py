@@ -37,12 +37,11 @@ def shares(error: Callable[[Reverted], float], changed: Sequence[str]) -> dict[t
 
     Returns:
         The share of one setting, and that which a second one adds to it; or of two together, by both names, where their own shares do not
-        add up. Where the sum is above 1, these are alternatives. Empty if no one or two of them explain nine tenths of the error, or if
-        half of it or more is left with all of them reverted.
+        add up. Where the sum is above 1, these are alternatives. Empty if no one or two of them explain nine tenths of the error.
     """
     error = cache(error)
     whole, calibrated = error(frozenset()), error(frozenset(changed))
-    if not abs(calibrated) < 0.5 * abs(whole):
+    if not abs(whole - calibrated) > 0.0:
         return {}
 
     def share(*names: str) -> float:

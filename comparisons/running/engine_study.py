@@ -4,7 +4,7 @@
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -143,17 +143,24 @@ class EngineStudy:
         options = self.processes.call(self.entry, written_out, scene, dt)
         if isinstance(options, Breakdown):
             return
+        error_of, written = self.error_of(metric, dt), replace(engine, options=options)
+        if not abs(error_of(written.calibrated)) < 0.5 * sizes[metric.name] * scale(scene, metric.unit):
+            return  # it is not the settings that err
+        changed = [name for name in options if name not in written.calibrated.options]
+        case = Case(scene.name, self.entry.label, dt, scene.steps(dt))
+        for settings, share in explaining(written, changed, error_of).items():
+            yield case.measurement("setting", metric.name, "1", Judgement(share, "measured"), settings)
+
+    def error_of(self, metric: Metric, dt: float) -> Callable[[Engine], float]:
+        """A function of the engine with other options: its error at a time step [s], from few starts; NaN if it has none."""
         phases = phases_at(self.own._replace(quick=True), dt)
 
-        def error_of(changed: Engine) -> float:
-            progress = Progress(scene.name, self.entry.label, dt, added=True)
-            outcome, _ = self._measured(engine_entry(changed), phases, progress, Timing())
+        def error(engine: Engine) -> float:
+            progress = Progress(self.own.scene.name, self.entry.label, dt, added=True)
+            outcome, _ = self._measured(engine_entry(engine), phases, progress, Timing())
             return outcome.points[metric.name].average.value if metric.name in outcome.points else math.nan
 
-        case = Case(scene.name, self.entry.label, dt, scene.steps(dt))
-        changed = [name for name in options if name not in engine.calibrated.options]
-        for settings, share in explaining(replace(engine, options=options), changed, error_of).items():
-            yield case.measurement("setting", metric.name, "1", Judgement(share, "measured"), settings)
+        return error
 
     @cached_property
     def claim(self) -> Claim:

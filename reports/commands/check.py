@@ -22,6 +22,7 @@ def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str 
 
     Exit code: 0 nothing failed, 1 a check failed or an accepted result is worse, 2 bad input, 3 an engine broke down or is missing.
     """
+    from dropspin.comparisons.regressions.ablation import with_explaining_settings
     from dropspin.comparisons.regressions.baseline import load_baseline
     from dropspin.comparisons.regressions.checking import check
     from dropspin.comparisons.results.store import load_results
@@ -40,6 +41,7 @@ def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str 
     file = None if baseline is None else story.BaselineFile(load_baseline(baseline), baseline, run)
     try:
         checked = check(results, None if file is None else file.baseline)
+        checked = checked if file is None else with_explaining_settings(checked, file.baseline)
     except DropspinError as error:
         raise DropspinError(f"{baseline}: {error} With --no-baseline, only the expectations of the scenes are checked.") from None
     document = story.document(checked, file, failures(checked.results, baseline))

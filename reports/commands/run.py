@@ -57,6 +57,7 @@ def run_command(
 
     Exit code: 0 nothing failed, 1 a check failed, 2 bad input, 3 an engine broke down, or a named engine is missing.
     """
+    from dropspin.comparisons.regressions.ablation import with_explaining_settings
     from dropspin.comparisons.regressions.baseline import load_baseline
     from dropspin.comparisons.regressions.checking import NothingAccepted, check
     from dropspin.reports.output import json_text
@@ -86,6 +87,7 @@ def run_command(
             print_table(results, summary_only=not verbose)
         try:
             checked = check(results, None if file is None else file.baseline)
+            checked = checked if file is None else with_explaining_settings(checked, file.baseline)
         except NothingAccepted as error:
             if json_output:
                 echo(json_text(results.table.to_dict("records")))

@@ -1,0 +1,34 @@
+"""Settings that changed since results were accepted: the one that explains the change is named."""
+
+import datetime
+
+import pytest
+
+from dropspin.comparisons.engines import pybullet_settings
+from dropspin.comparisons.regressions.ablation import with_explaining_settings
+from dropspin.comparisons.regressions.baseline import Baseline, load_baseline, write_baseline
+from dropspin.comparisons.regressions.checking import accept, check
+from dropspin.comparisons.running.run import run
+from dropspin.reports.stories.failures import settings_that_explain
+from dropspin.scenarios import load
+
+
+def test_check_names_the_setting_of_the_adapter_that_changed_its_results(monkeypatch, tmp_path):
+    """Of two settings whose calibrated values change, that which moves the rebound; the baseline keeps the accepted values."""
+    ball = load("drop-ball").model_copy(update={"duration": 0.8})
+    accepted, _ = accept(run(ball, ["pybullet", "mujoco"], 4e-3), Baseline(), "first", datetime.date(2026, 3, 1))
+    write_baseline(accepted, tmp_path / "baseline.toml")
+    accepted = load_baseline(tmp_path / "baseline.toml")
+    again = run(ball, ["pybullet", "mujoco"], 4e-3)
+    assert with_explaining_settings(check(again, accepted), accepted).results.table.equals(check(again, accepted).results.table)
+    for name, value in (("contactERP", 0.3), ("numSolverIterations", 400)):
+        monkeypatch.setitem(pybullet_settings.WORLD, name, pybullet_settings.WORLD[name]._replace(calibrated=value))
+    changed = run(ball, ["pybullet", "mujoco"], 4e-3)
+    checked = check(changed, accepted)
+    [(engine, cause)] = checked.attributions
+    assert (engine, cause.origin) == ("pybullet", "settings")
+    assert "contactERP, numSolverIterations" in cause.message or "numSolverIterations, contactERP" in cause.message
+    rows = with_explaining_settings(checked, accepted).results.table.query("kind == 'setting'")
+    assert dict(zip(rows["truth"], rows["value"], strict=True)) == {"contactERP=0.3": pytest.approx(1.0, abs=1e-6)}
+    [sentence] = settings_that_explain(with_explaining_settings(checked, accepted).results, "pybullet")
+    assert sentence.startswith("drop-ball: contactERP=0.3 explains 100 % of the ")

@@ -14,6 +14,7 @@ import rapier3d
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation
+from dropspin.comparisons.engines.options import Setting
 from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.rapier_scenes import WHY_DAMPING, WHY_FRICTION, damping_of, refusal, surface_of
 from dropspin.comparisons.measuring.predictions import spins_steadily
@@ -23,22 +24,72 @@ from dropspin.scenarios.state import PARTS
 
 LARGEST = float(np.finfo(np.float32).max)
 FIRST_PROCESS = cache(os.getpid)  # the first one that simulates; it starts Rapier's threads, which all worlds share
-PARAMETERS = {
-    "num_solver_iterations": (1, "substeps; at the default 4 velocity lags by an eighth of a step, and a ball gains 1.7e-3 of its energy"),
-    "num_internal_pgs_iterations": (50, "for positions; at 1 a turning box on a rough floor errs by 1e-4 in energy instead of 8e-6"),
-    "num_internal_stabilization_iterations": (50, "for velocities; with 1 for both, a gripping corner keeps moving down at 1.4 of 3.8 m/s"),
-    "normalized_max_corrective_velocity": (LARGEST, "corrects depth in one step without changing the velocity; 3 m/s by default"),
-    "static_contact_softness": ((1e9, 1.0), "Hz, damping ratio; at 60 Hz a bounce errs by 4.6e-3, not 8e-4; boxes rest 0.1 mm deep"),
-    "normalized_max_linear_velocity": (LARGEST, "no clamp of the speed, at 400 m/s by default"),
-    "friction_in_bias_pass": (True, "also in position corrections; without it a rocking block gains 3.7e-5 of its energy, not 4e-6"),
+OFF_ON = ("false", "true")
+WORLD = {
+    "num_solver_iterations": Setting(
+        4, "substeps", 1, "substeps; at the default 4 velocity lags by an eighth of a step, and a ball gains 1.7e-3 of its energy", least=1
+    ),
+    "num_internal_pgs_iterations": Setting(
+        1, "of positions", 50, "for positions; at 1 a turning box on a rough floor errs by 1e-4 in energy instead of 8e-6", least=1
+    ),
+    "num_internal_stabilization_iterations": Setting(
+        1, "of velocities", 50, "for velocities; with 1 for both, a gripping corner keeps moving down at 1.4 of 3.8 m/s", least=1
+    ),
+    "normalized_max_corrective_velocity": Setting(
+        3.0,
+        "largest correction of depth",
+        LARGEST,
+        "corrects depth in one step without changing the velocity; 3 m/s by default",
+        unit="m/s",
+    ),
+    "static_contact_softness": Setting(
+        (60.0, 10.0),
+        "frequency [Hz] and damping ratio of contacts with the floor",
+        (1e9, 1.0),
+        "Hz, damping ratio; at 60 Hz a bounce errs by 4.6e-3, not 8e-4; boxes rest 0.1 mm deep",
+    ),
+    "normalized_max_linear_velocity": Setting(400.0, "largest speed", LARGEST, "no clamp of the speed, at 400 m/s by default", unit="m/s"),
+    "friction_in_bias_pass": Setting(
+        "false",
+        "friction in position corrections",
+        "true",
+        "also in position corrections; without it a rocking block gains 3.7e-5 of its energy, not 4e-6",
+        values=OFF_ON,
+    ),
+    "normalized_prediction_distance": Setting(
+        0.02,
+        "distance at which a contact begins",
+        why="a step's fall; at 0 turning on a rough floor errs by 0.19 rad, not 5e-3; at 2 cm landings by 1.5%",
+        unit="m",
+        is_computed=True,
+    ),
+    "normalized_allowed_linear_error": Setting(0.005, "depth that is not corrected", unit="m"),
+    "warmstart_coefficient": Setting(1.0, "share of the last step's impulses with which the solver starts"),
 }
-REASONS = {name: why for name, (_, why) in PARAMETERS.items()} | {
-    "normalized_prediction_distance": "a step's fall; at 0 turning on a rough floor errs by 0.19 rad, not 5e-3; at 2 cm landings by 1.5%",
-    "gyroscopic_forces": "off in steady flight, where they are 0; rounding in L = I ω and back would add 1.2e-4 of L in 1000 steps",
-    "allow_fast_rotation": "no clamp of the angular velocity, at π/4 a step by default",
-    "linear_damping": f"{WHY_DAMPING}; angular_damping is the same",
-    "friction": WHY_FRICTION,
+"""Of the integration parameters."""
+BODY = {
+    "can_sleep": Setting("true", "the body may fall asleep", "false", "never falls asleep", values=OFF_ON),
+    "allow_fast_rotation": Setting(
+        "false", "no limit of the angular velocity", "true", "no clamp of the angular velocity, at π/4 a step by default", values=OFF_ON
+    ),
+    "gyroscopic_forces": Setting(
+        "true",
+        "the gyroscopic term",
+        why="off in steady flight, where they are 0; rounding in L = I ω and back would add 1.2e-4 of L in 1000 steps",
+        values=OFF_ON,
+        is_computed=True,
+    ),
+    "linear_damping": Setting(0.0, "damping", why=f"{WHY_DAMPING}; angular_damping is the same", unit="1/s", is_computed=True),
+    "angular_damping": Setting(0.0, "damping of rotation", unit="1/s", is_computed=True),
 }
+"""Of the body."""
+SURFACE = {
+    "restitution": Setting(0.0, "of the body", is_computed=True),
+    "friction": Setting(0.5, "of the body", why=WHY_FRICTION, is_computed=True),
+}
+FLOOR = {f"floor_{name}": setting._replace(what="of the floor") for name, setting in SURFACE.items()}
+SETTINGS = WORLD | BODY | SURFACE | FLOOR
+REASONS = {name: setting.why for name, setting in SETTINGS.items() if setting.why}
 """Effects were measured at 1 ms without the one setting."""
 
 
@@ -47,36 +98,49 @@ class Rapier(Engine):
 
     name, order, precision, reasons = "rapier", 1.0, np.float32, REASONS
     shapes: ClassVar = ("sphere", "box")
-    choices: ClassVar = {"floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}
+    choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
+    settings: ClassVar = SETTINGS
 
     def declines(self, scene: Scenario) -> str | None:
         return refusal(scene, self.option("floor"))
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return RapierSimulation(scene, dt, self.option("floor"), self.option("beside"))
+        return RapierSimulation(scene, dt, self)
 
 
 class RapierSimulation(Simulation):
     """A Rapier world."""
 
-    def __init__(self, scene: Scenario, dt: float, floor: str, beside: str) -> None:
-        self.velocity_lag = 0.5 * dt
+    def __init__(self, scene: Scenario, dt: float, engine: Rapier) -> None:
         self._world = rapier3d.PhysicsWorld(gravity=scene.acceleration)
         if FIRST_PROCESS() != os.getpid():  # a forked process has none of those threads and would wait for them forever
             self._world.set_num_threads(1)
-        parameters: dict[str, Any] = {name: value for name, (value, _) in PARAMETERS.items()}
-        parameters |= {"dt": dt, "normalized_prediction_distance": float(np.linalg.norm(scene.acceleration)) * dt**2}
+        given = {name: value == "true" if value in OFF_ON else value for name, value in engine.given.items()}
+        gyroscopic = mapping.may_tumble(scene) and (scene.floor is not None or not spins_steadily(scene))
+        damping = {f"{motion}_damping": rate for motion, rate in damping_of(scene, dt).items()}
+        parameters: dict[str, Any] = {"dt": dt}
+        dynamics: dict[str, Any] = {f"{motion}_damping": rate for motion, rate in scene.damping.rates.items()} if scene.damping else {}
+        if not engine.is_default:
+            parameters |= {name: one.calibrated for name, one in WORLD.items() if one.calibrated is not None}
+            parameters |= {"friction_in_bias_pass": True}
+            parameters |= {"normalized_prediction_distance": float(np.linalg.norm(scene.acceleration)) * dt**2}
+            dynamics = {"can_sleep": False, "allow_fast_rotation": True, "gyroscopic_forces": gyroscopic} | damping
+        parameters |= {name: value for name, value in given.items() if name in WORLD}
+        dynamics |= {name: value for name, value in given.items() if name in BODY}
         for name, value in parameters.items():
             setattr(self._world.integration_parameters, name, rapier3d.SpringCoefficients(*value) if isinstance(value, tuple) else value)
-        gyroscopic = mapping.may_tumble(scene) and (scene.floor is not None or not spins_steadily(scene))
-        dynamics: dict[str, Any] = {"can_sleep": False, "allow_fast_rotation": True, "gyroscopic_forces": gyroscopic}
-        dynamics |= {f"{motion}_damping": rate for motion, rate in damping_of(scene, dt).items()}
-        surface = surface_of(scene)
-        self._body, *_ = [self._add_body(one, dynamics, surface) for one in mapping.bodies_in(scene, beside)]
-        if surface:
-            self._world.add_collider(_floor(floor, surface))
-        self.settings = {"version": version("rapier3d"), "floor": floor, "beside": beside, **parameters, **dynamics, **surface}
+        self.velocity_lag = 0.5 * dt / self._world.integration_parameters.num_solver_iterations
+        surfaces = [surface_of(scene), surface_of(scene)]
+        for surface, prefix in zip(surfaces, ("", "floor_"), strict=True):
+            surface |= {name: given[prefix + name] for name in surface if prefix + name in given}
+        self._body, *_ = [self._add_body(one, dynamics, surfaces[0]) for one in mapping.bodies_in(scene, engine.option("beside"))]
+        if scene.floor:
+            self._world.add_collider(_floor(engine.option("floor"), surfaces[1]))
+        form = {name: engine.option(name) for name in engine.choices}
+        of_floor = {f"floor_{name}": value for name, value in surfaces[1].items()}
+        shown = {name: OFF_ON[value] if isinstance(value, bool) else value for name, value in (parameters | dynamics).items()}
+        self.settings = {"version": version("rapier3d"), **form, **shown, **surfaces[0], **of_floor}
 
     def _add_body(self, scene: Scenario, dynamics: Mapping[str, Any], surface: Mapping[str, Any]) -> Any:
         """Add a scene's body with its collider, if the scene has a floor."""

@@ -1,5 +1,6 @@
 """The engine `dart`: DART's free joint over a half-space. DART solves contacts after gravity has acted, hence v+ = e (u + g dt)."""
 
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import dartpy as dart
@@ -27,11 +28,11 @@ REASONS = {
 
 
 class Dart(Engine):
-    """DART's rigid body over a plane, or over a box."""
+    """DART's rigid body over a plane, or over a box; or with DART's defaults (profile=default)."""
 
     name, order, reasons = "dart", 1.0, REASONS
     shapes: ClassVar = ("sphere", "box")
-    choices: ClassVar = {"floor": ("plane", "box"), "beside": mapping.BESIDE}
+    choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
 
     def discretisation(self, scene: Scenario) -> str | None:
@@ -46,21 +47,21 @@ class Dart(Engine):
         return unfit or mapping.refusal_of_rest_speed(scene, "DART", "it sets rebounds below 0.1 m/s to 0")
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return DartSimulation(scene, dt, self.option("floor"), self.option("beside"))
+        return DartSimulation(scene, dt, {name: self.option(name) for name in self.choices})
 
 
 class DartSimulation(Simulation):
     """A DART world with the body's skeleton and, if the scene has a floor, the floor's."""
 
-    def __init__(self, scene: Scenario, dt: float, floor: str, beside: str) -> None:
+    def __init__(self, scene: Scenario, dt: float, form: Mapping[str, str]) -> None:
         self.velocity_lag = 0.5 * dt
         self._scene, self._world = scene, dart.simulation.World()
         self._world.setTimeStep(dt)
         self._world.setGravity(scene.acceleration)
-        self.settings = {"version": version("dartpy"), "floor": floor, "beside": beside}
+        self.settings = {"version": version("dartpy"), **form}
         if scene.floor is not None:
-            self.settings |= self._add_floor(scene.floor, floor)
-        self._body, *_ = [self._add_body(one) for one in mapping.bodies_in(scene, beside)]
+            self.settings |= self._add_floor(scene.floor, form["floor"], is_calibrated=form["profile"] == "calibrated")
+        self._body, *_ = [self._add_body(one) for one in mapping.bodies_in(scene, form["beside"])]
 
     def _add_body(self, scene: Scenario) -> Any:
         skeleton, mounting = dart.dynamics.Skeleton(f"body {self._world.getNumSkeletons()}"), dart.math.Isometry3()
@@ -82,18 +83,19 @@ class DartSimulation(Simulation):
         self._world.addSkeleton(skeleton)
         return body
 
-    def _add_floor(self, floor: Floor, kind: str) -> dict[str, str | float]:
+    def _add_floor(self, floor: Floor, kind: str, *, is_calibrated: bool) -> dict[str, Any]:
         solver, sleep = self._world.getConstraintSolver(), dart.simulation.DeactivationOptions()
-        sleep.mEnabled = False
-        self._world.setDeactivationOptions(sleep)
-        self._world.setCollisionDetector(dart.collision.OdeCollisionDetector())
-        solver.setSplitImpulseEnabled(True)
-        if not isinstance(floor.friction, str):
-            options = dart.constraint.NsgsFrictionSolver.Options()
-            options.tolerance = 1e-8
-            solver.setBoxedLcpSolver(dart.constraint.NsgsFrictionSolver(options))
-        friction = mapping.friction_of(floor, gripping=1e6)
-        restitution = min(1.0, floor.restitution + (1.0 + floor.restitution) * 1e-5)
+        friction, restitution = mapping.friction_of(floor, gripping=1e6), floor.restitution
+        if is_calibrated:
+            sleep.mEnabled = False
+            self._world.setDeactivationOptions(sleep)
+            self._world.setCollisionDetector(dart.collision.OdeCollisionDetector())
+            solver.setSplitImpulseEnabled(True)
+            restitution = min(1.0, restitution + (1.0 + restitution) * 1e-5)
+            if not isinstance(floor.friction, str):
+                options = dart.constraint.NsgsFrictionSolver.Options()
+                options.tolerance = 1e-8
+                solver.setBoxedLcpSolver(dart.constraint.NsgsFrictionSolver(options))
         ground, half = dart.dynamics.Skeleton("floor"), np.full(3, FLOOR_HALF_SIZE)
         shape = dart.dynamics.BoxShape(2.0 * half) if kind == "box" else dart.dynamics.PlaneShape([0.0, 1.0, 0.0], 0.0)
         # DART multiplies the two restitutions and uses the smaller friction.
@@ -101,8 +103,9 @@ class DartSimulation(Simulation):
         if kind == "box":
             part.setRelativeTranslation([0.0, -FLOOR_HALF_SIZE, 0.0])
         self._world.addSkeleton(ground)
-        solved = {"collision_detector": "ode", "lcp_solver": solver.getBoxedLcpSolver().getType(), "split_impulse": True}
-        return solved | {"deactivation": False, "restitution": restitution, "friction": friction}
+        detector, lcp = self._world.getCollisionDetector().getType(), solver.getBoxedLcpSolver().getType()
+        solved = {"collision_detector": detector, "lcp_solver": lcp, "split_impulse": solver.isSplitImpulseEnabled()}
+        return solved | {"deactivation": self._world.getDeactivationOptions().mEnabled, "restitution": restitution, "friction": friction}
 
     def advance(self, steps: int) -> None:
         for _ in range(steps):

@@ -1,6 +1,7 @@
 """The engine `drake`: Drake's discrete plant, a body's corners over a half-space. Its contacts are damped so that restitution is 0."""
 
 import logging
+from collections.abc import Mapping
 from itertools import product
 from typing import Any, ClassVar
 
@@ -39,7 +40,7 @@ class Drake(Engine):
     name = "drake"
     order = 1.0
     reasons = REASONS
-    choices: ClassVar = {"floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}
+    choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
 
     def discretisation(self, scene: Scenario) -> str | None:
@@ -54,24 +55,24 @@ class Drake(Engine):
         return unfit or mapping.refusal_of_floor(scene, self.option("floor"))
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return DrakeSimulation(scene, dt, self.option("floor"), self.option("beside"))
+        return DrakeSimulation(scene, dt, {name: self.option(name) for name in self.choices})
 
 
 class DrakeSimulation(Simulation):
     """A plant in a simulator, with a scene graph if the scene has a floor."""
 
-    def __init__(self, scene: Scenario, dt: float, floor: str, beside: str) -> None:
+    def __init__(self, scene: Scenario, dt: float, form: Mapping[str, str]) -> None:
         self.velocity_lag = 0.5 * dt
         builder: Any = DiagramBuilder()
         self._dt, self._steps = dt, 0
         self._plant = builder.AddSystem(MultibodyPlant(dt)) if scene.floor is None else AddMultibodyPlantSceneGraph(builder, dt)[0]
-        scenes = mapping.bodies_in(scene, beside)
+        scenes = mapping.bodies_in(scene, form["beside"])
         bodies = [self._add_body(one, self._plant.AddModelInstance(f"body {number}")) for number, one in enumerate(scenes)]
         self._body = bodies[0]
         self._plant.mutable_gravity_field().set_gravity_vector(scene.acceleration)
-        self.settings = {"version": version("drake"), "floor": floor, "beside": beside}
+        self.settings = {"version": version("drake"), **form}
         if scene.floor is not None:
-            self.settings |= self._add_floor(scene, scene.floor, floor, bodies)
+            self.settings |= self._add_floor(scene, scene.floor, form, bodies)
         self._plant.Finalize()
         self._simulator = Simulator(builder.Build())
         self._context = self._plant.GetMyMutableContextFromRoot(self._simulator.get_mutable_context())
@@ -91,21 +92,25 @@ class DrakeSimulation(Simulation):
             self._plant.AddJoint(QuaternionFloatingJoint("free", *frames, *rates))
         return body
 
-    def _add_floor(self, scene: Scenario, floor: Floor, kind: str, bodies: list[Any]) -> dict[str, Any]:
+    def _add_floor(self, scene: Scenario, floor: Floor, form: Mapping[str, str], bodies: list[Any]) -> dict[str, Any]:
         plant, body, approximation = self._plant, scene.body, "sap" if isinstance(floor.friction, str) else "tamsi"
         friction = mapping.friction_of(floor, gripping=1e6)
-        chosen = {"sap_near_rigid_threshold": 0.01, "relaxation_time": 1.0, "dissipation": 1e7, "friction": friction}
-        plant.set_discrete_contact_approximation(getattr(DiscreteContactApproximation, f"k{approximation.capitalize()}"))
-        plant.set_sap_near_rigid_threshold(chosen["sap_near_rigid_threshold"])
-        stiffness, surfaces = [1e9 * body.mass, 1e12 * body.mass], [ProximityProperties(), ProximityProperties()]
-        for surface, spring in zip(surfaces, stiffness, strict=True):
-            AddContactMaterial(surface, chosen["dissipation"], spring, CoulombFriction(friction, friction))
-            surface.AddProperty("material", "relaxation_time", chosen["relaxation_time"])
-        plant.RegisterCollisionGeometry(plant.world_body(), *_floor(kind), "floor", surfaces[0])
+        surfaces, found = [ProximityProperties(), ProximityProperties()], dict[str, Any](friction=friction)
+        if form["profile"] == "calibrated":
+            found |= {"sap_near_rigid_threshold": 0.01, "relaxation_time": 1.0, "dissipation": 1e7}
+            found |= {"discrete_contact_approximation": approximation, "stiffness": [1e9 * body.mass, 1e12 * body.mass]}
+            plant.set_discrete_contact_approximation(getattr(DiscreteContactApproximation, f"k{approximation.capitalize()}"))
+            plant.set_sap_near_rigid_threshold(found["sap_near_rigid_threshold"])
+        for number, surface in enumerate(surfaces):
+            spring = (found["dissipation"], found["stiffness"][number]) if "stiffness" in found else (None, None)
+            AddContactMaterial(surface, *spring, CoulombFriction(friction, friction))
+            if "relaxation_time" in found:
+                surface.AddProperty("material", "relaxation_time", found["relaxation_time"])
+        plant.RegisterCollisionGeometry(plant.world_body(), *_floor(form["floor"]), "floor", surfaces[0])
         # One shape would have one point contact with the floor; balls of radius 0 give each corner its own.
         for (number, corner), one in product(enumerate(body.vertices), bodies):
             plant.RegisterCollisionGeometry(one, RigidTransform(corner), Sphere(body.semi_axes[0]), f"corner {number}", surfaces[1])
-        return {"discrete_contact_approximation": approximation, "stiffness": stiffness} | chosen
+        return found
 
     def advance(self, steps: int) -> None:
         self._steps += steps

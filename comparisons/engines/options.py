@@ -153,6 +153,8 @@ class Configured:
         for why, names in ELSEWHERE.items():
             if option not in self._known and _bare(option) in map(_bare, names):
                 raise DropspinError(f"{self.name}'s {option} is {why}.")
+        if option == "profile" and option not in self.choices:
+            raise DropspinError(f"{self.name} has no profiles; dropspin show SCENE -e {self.name} prints the settings that it always has.")
         self._verify_known("option", option, self._known)
         if option in self.settings:
             setting = self.settings[option]

@@ -144,9 +144,9 @@ class EngineStudy:
         if isinstance(options, Breakdown):
             return
         error_of, written = self.error_of(metric, dt), replace(engine, options=options)
-        if not abs(error_of(written.calibrated)) < 0.5 * sizes[metric.name] * scale(scene, metric.unit):
-            return  # it is not the settings that err
         changed = [name for name in options if name not in written.calibrated.options]
+        if not changed or not abs(error_of(written.calibrated)) < 0.5 * sizes[metric.name] * scale(scene, metric.unit):
+            return  # it is not the settings that err
         case = Case(scene.name, self.entry.label, dt, scene.steps(dt))
         for settings, share in explaining(written, changed, error_of).items():
             yield case.measurement("setting", metric.name, "1", Judgement(share, "measured"), settings)

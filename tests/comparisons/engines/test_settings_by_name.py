@@ -9,6 +9,7 @@ from dropspin.comparisons.engines.mujoco_settings import SETTINGS, in_force
 from dropspin.comparisons.engines.options import spelled
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.verification import verify_build
 from dropspin.reports.stories.show import built_rows, setting_rows
 from dropspin.scenarios import DropspinError, load
 
@@ -47,6 +48,7 @@ def falling(duration=1.0, floor=FLOOR):
         ("pybullet[contactStiffness=1e4]", "contactStiffness and contactDamping go together"),
         ("pybullet[linearDamping=0,linear_damping=1]", "an option is given twice"),
         ("mujoco[timestep=0.01]", "timestep is the time step of the run; give it with --dt"),
+        ("wang[profile=default]", "wang has no profiles; dropspin show SCENE -e wang prints the settings"),
         ("pybullet[mass=2]", "mass is the scene's: change the table body"),
     ],
 )
@@ -150,3 +152,25 @@ def test_show_lists_settings_with_sources_and_marks():
     rows = {row["what"]: row for row in built_rows(falling(), "mujoco[profile=default]", 1e-3)}
     assert (rows["solref"]["is"], rows["solref"]["source"], rows["solref"]["calibrated"]) == ("0.02 1", "engine's default", "0 -1600")
     assert "o_solref" not in rows  # without override it has no effect
+
+
+@pytest.mark.parametrize("name", ["rapier", "dart", "drake"])
+def test_default_profile_of_other_engines_is_not_the_calibrated_one(name):
+    """The body and its start are the same; the motion is another one where it slides."""
+    sliding = load("slide-box").model_copy(update={"duration": 0.2})
+    default, calibrated = engine(f"{name}[profile=default]"), engine(name)
+    with default.prepare(sliding, 2e-3) as simulation:
+        verify_build(default, sliding, simulation, 2e-3)
+        assert simulation.settings["profile"] == "default"
+    moved = simulate(sliding, default, 2e-3).position - simulate(sliding, calibrated, 2e-3).position
+    assert 1e-6 < np.abs(moved).max() < 0.1
+
+
+def test_rapiers_default_has_four_substeps_and_averages_restitutions():
+    """Velocity lags by half a substep; a ball of restitution 0.6 on a floor of 0.2 rebounds with 0.4, to single precision and a step."""
+    smooth = {"restitution": 0.6, "friction": "none"}
+    drop = scene(0.2, start={"position": [0.0, 0.15, 0.0], "velocity": [0.0, -2.0, 0.0]}, floor=smooth)
+    with engine("rapier[profile=default]").prepare(drop, 2e-3) as simulation:
+        assert simulation.velocity_lag == 0.5 * 2e-3 / 4
+    speeds = simulate(drop, "rapier[floor_restitution=0.2]", 1e-3).velocity[:, 1]
+    assert speeds.max() == pytest.approx(0.8, abs=2e-3)

@@ -62,8 +62,14 @@ def test_default_profiles_are_explained():
     assert sum(found.values()) == pytest.approx(1.0, abs=1e-3)
 
 
-@pytest.mark.parametrize(("scene_name", "dt"), [("drop-ball", 2e-3), ("drop-box-edge", 2e-3), ("spin-damped", 2e-3), ("slide-box", 4e-3)])
-@pytest.mark.parametrize("name", ["mujoco", "pybullet"])
+@pytest.mark.parametrize(
+    ("name", "scene_name", "dt"),
+    [
+        *(("mujoco", "drop-ball", 2e-3), ("mujoco", "drop-box-edge", 2e-3), ("mujoco", "spin-damped", 2e-3), ("mujoco", "slide-box", 4e-3)),
+        *(("pybullet", "drop-ball", 2e-3), ("pybullet", "drop-box-edge", 2e-3), ("pybullet", "spin-damped", 2e-3)),
+        *(("pybullet", "slide-box", 4e-3), ("rapier", "drop-ball", 2e-3), ("rapier", "spin-damped", 2e-3), ("rapier", "slide-box", 4e-3)),
+    ],
+)
 def test_default_profile_is_the_calibrated_one_with_its_settings_written_out(name, scene_name, dt):
     """The same motion: so the list of settings is complete. Bullet's own damping is in single precision."""
     entry, scene = engine_entry(f"{name}[profile=default]"), load(scene_name)

@@ -46,7 +46,7 @@ def write_report(results: Results, folder: str | Path, sections: Sequence[Docume
 def fill(results: Results, folder: Path, sections: Sequence[Document] = (), plots: Collection[str] = ()) -> None:
     """Write the data and the reports of a run into an empty folder, and its plots as files of these kinds, `svg` or `png`."""
     summary, charts_of = overview(results), report_charts(results)
-    save(results, folder)
+    save(results, folder, summary.conclusion)
     results.table.to_csv(folder / "results.csv", index=False)
     (folder / "report.html").write_text(html_report(results, summary, charts_of, sections), encoding="utf-8")
     (folder / "report.md").write_text(markdown(document(results, summary), level=2), encoding="utf-8")

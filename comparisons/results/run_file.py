@@ -20,7 +20,7 @@ FORMAT = 6
 FILE, TABLE = "run.json", "results.parquet"
 ARRAY_FILE = re.compile(r"(trajectories|ensembles)/[A-Za-z0-9][A-Za-z0-9.=_-]*\.npz")
 
-Seconds = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Texts = dict[Text, Text]
 ArrayPath = Annotated[str, Field(pattern=f"^{ARRAY_FILE.pattern}$")]
 
@@ -39,17 +39,18 @@ class Case(_Table):
 
     scene: Text
     engine: Text
-    dt: Seconds
+    dt: Positive
 
 
 class _Asked(_Table):
-    """What a run was asked for; `draw` and `seed` if scenes were drawn."""
+    """What a run was asked for; `draw` and `seed` if scenes were drawn, `within` if a tolerance of the conclusion was given."""
 
     scenes: list[Text]
     engines: list[Text]
-    dts: Annotated[list[Seconds], Field(min_length=1)]
-    time_limit: Seconds
+    dts: Annotated[list[Positive], Field(min_length=1)]
+    time_limit: Positive
     quick: bool = False
+    within: Positive | None = None
     draw: Annotated[int, Field(ge=1)] | None = None
     seed: Annotated[int, Field(ge=0)] | None = None
 
@@ -73,7 +74,7 @@ class _Provenance(_Table):
     settings_digests: Texts = {}
     motions: dict[Text, dict[Text, dict[Text, Text]]] = {}
     named: list[Text] = []
-    compilation: dict[Text, Seconds] = {}
+    compilation: dict[Text, Positive] = {}
 
 
 class RunFile(_Table):
@@ -88,6 +89,7 @@ class RunFile(_Table):
         origins: Where each scene is from: a name of the catalogue, a path, or empty.
         trajectories: By path of the file, the scene, the engine and the time step.
         ensembles: The same.
+        conclusion: The sentences with which the report begins, for readers of the file; they are not loaded.
         sha256: By path, the checksums of all files that are loaded; that of `run.json` is of its content without this entry.
     """
 
@@ -99,6 +101,7 @@ class RunFile(_Table):
     origins: Texts
     trajectories: dict[ArrayPath, Case]
     ensembles: dict[ArrayPath, Case]
+    conclusion: list[Text] = []
     sha256: dict[str, str]
 
     @model_validator(mode="after")

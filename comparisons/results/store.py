@@ -5,7 +5,7 @@ A folder may be damaged, or somebody else's: all of it is verified on loading, a
 
 import io
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -34,7 +34,7 @@ LARGEST_HEADER = 1000  # bytes, of an array in a file
 Kept = TypeVar("Kept")
 
 
-def save(results: Results, folder: Path, *, compress: bool = True) -> None:
+def save(results: Results, folder: Path, conclusion: Sequence[str] = (), *, compress: bool = True) -> None:
     """Write a run's data into a folder that exists; compressing its arrays takes six times as long as writing them."""
     checksums: dict[str, str] = {}
     trajectories = _save_arrays(folder, "trajectories", results.trajectories, checksums, compress)
@@ -50,6 +50,7 @@ def save(results: Results, folder: Path, *, compress: bool = True) -> None:
         "origins": {name: scene.origin for name, scene in results.scenes.items()},
         "trajectories": trajectories,
         "ensembles": ensembles,
+        "conclusion": list(conclusion),
         "sha256": checksums,
     }
     (folder / FILE).write_text(signed(content), encoding="utf-8")

@@ -70,6 +70,12 @@ class _Positive(click.FloatRange):
 
 
 POSITIVE = _Positive()
+within_option = click.option(
+    "--within",
+    type=POSITIVE,
+    metavar="SHARE",
+    help="Largest error, relative to its scale, up to which the conclusion recommends an engine. [default: 0.01]",
+)
 
 
 class WholeNumbers(click.ParamType):  # type: ignore[type-arg]  # not generic at run time before click 8.5

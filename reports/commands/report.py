@@ -1,10 +1,12 @@
 """`dropspin report`."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
+from dropspin.reports.commands.options import within_option
 from dropspin.reports.terminal.safe import echo
 
 
@@ -20,7 +22,8 @@ from dropspin.reports.terminal.safe import echo
 @click.option(
     "--plots", multiple=True, type=click.Choice(["svg", "png"]), help="Also write the plots as files of this format; repeat for both."
 )
-def report_command(run: str, studies: tuple[str, ...], plots: tuple[str, ...]) -> None:
+@within_option
+def report_command(run: str, studies: tuple[str, ...], plots: tuple[str, ...], within: float | None) -> None:
     """Write the report of a run again: to add studies, to write plots as files, or after an update of dropspin.
 
     The new report has only the studies and plots given in this call. A replay in the folder is kept.
@@ -31,6 +34,9 @@ def report_command(run: str, studies: tuple[str, ...], plots: tuple[str, ...]) -
 
     sections = [read_study(folder) for folder in dict.fromkeys(studies)]
     results = load_results(Path(run))
+    if within is not None:
+        asked = {**results.provenance["asked"], "within": within}
+        results = replace(results, provenance={**results.provenance, "asked": asked})
     with run_folder(run) as unfinished:
         fill(results, unfinished, sections, plots)
         replay = Path(run) / "replay.html"

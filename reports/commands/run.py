@@ -7,12 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dropspin.reports.commands.options import as_json, baseline_option, engines_option, jobs_option, output_option, time_limit_option
+from dropspin.reports.commands.options import (
+    as_json,
+    baseline_option,
+    engines_option,
+    jobs_option,
+    output_option,
+    time_limit_option,
+    within_option,
+)
 from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from dropspin.comparisons.results.results import Results
     from dropspin.comparisons.running.forecast import Forecast
@@ -34,6 +42,7 @@ CORE_ENGINES = ("wang", "mujoco", "pybullet")
 @time_limit_option(300.0, "an engine may use for one scene at one time step")
 @jobs_option("scenes to run")
 @click.option("--quick", is_flag=True, help="Run few starts, for a first answer from a slow engine; fewer checks are decided.")
+@within_option
 @baseline_option
 @click.option("--resume", is_flag=True, help="Resume an interrupted run: scenes that are already measured are not run again.")
 @click.option("-v", "--verbose", is_flag=True, help="Also print a table of every metric for each scene.")
@@ -44,6 +53,7 @@ def run_command(
     output: str,
     count: int | None,
     seed: int | None,
+    within: float | None,
     baseline: str | None,
     verbose: bool,
     json_output: bool,
@@ -75,11 +85,12 @@ def run_command(
     named = scenes or (() if count is not None else ("core",))
     core = [scene for scene in map(load, names()) if "core" in scene.tags] if "core" in named else []
     loaded = [scene for name in named for scene in (core if name == "core" else [load(name)])]
-    asked: dict[str, int] = {}
+    asked: dict[str, float] = {} if within is None else {"within": within}
     if count is not None:
-        asked = {"draw": count, "seed": secrets.randbits(32) if seed is None else seed}
-        loaded += draw(count, asked["seed"])
-        echo(f"Drawn with --seed {asked['seed']}", err=json_output)
+        seed = secrets.randbits(32) if seed is None else seed
+        asked |= {"draw": count, "seed": seed}
+        loaded += draw(count, seed)
+        echo(f"Drawn with --seed {seed}", err=json_output)
     file = None if baseline is None else story.BaselineFile(load_baseline(baseline), baseline, output)
     results = _run(loaded, engines, asked, output, **options)
     try:
@@ -107,7 +118,7 @@ def run_command(
 def _run(
     scenes: "Sequence[Scenario]",
     engines: tuple[str, ...],
-    drawn: dict[str, int],
+    asked: "Mapping[str, float]",
     output: str,
     *,
     dts: tuple[float, ...],
@@ -120,7 +131,7 @@ def _run(
     Args:
         scenes: The scenes.
         engines: The engines that were named.
-        drawn: Number and seed of the scenes that were drawn.
+        asked: Number and seed of the scenes that were drawn, and the tolerance of the conclusion, as far as they were given.
         output: The folder.
         dts: The time steps that were named [s].
         resume: Whether to keep the scenes that an interrupted run measured.
@@ -157,9 +168,9 @@ def _run(
             stop_if_interrupted()
             if changes := {what_changed(part.provenance, results.provenance) for part in earlier} - {""}:
                 echo(f"measured again, not resumed: since the interrupted run, {'; '.join(sorted(changes))} changed", err=True)
-            asked = {**results.provenance["asked"], **drawn}
             named = sorted({name.strip() for name in engines})
-            results = replace(results, provenance={**results.provenance, "asked": asked, "named": named})
+            stamp = {"asked": {**results.provenance["asked"], **asked}, "named": named}
+            results = replace(results, provenance={**results.provenance, **stamp})
             if test_symmetries:
                 finest, kept = min(steps), {name: options[name] for name in ("resources", "jobs")}
                 with share_bar("symmetries") as on_share:

@@ -3,7 +3,7 @@
 import math
 import statistics
 from collections import Counter
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +13,9 @@ from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
-from dropspin.comparisons.results.results import SMALLEST_STATED, UNDECIDED, Results, Status, is_undecided, relative_sizes
+from dropspin.comparisons.results.results import SMALLEST_STATED, Results, Status, relative_sizes
 from dropspin.reports.stories.matrix import step_times
-from dropspin.reports.stories.numbers import duration, failing, formatted, in_ms, quantity, with_unit
+from dropspin.reports.stories.numbers import duration, failing, formatted, in_ms, named, quantity, with_unit
 from dropspin.scenarios.text import counted
 
 if TYPE_CHECKING:
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 CONVERGING = frozenset({"passed", "measured", "no_truth"})
 """Verdicts that are no finding."""
-MOST_NAMED = 3
-"""Scenes, metrics or engines that a sentence names; of more it has the number."""
 SAME_SIZE = 0.999
 """Errors count as equal from this share of the largest one on."""
 ENGINE_NAMES = {"wang": "wang (Wang's method)"}
@@ -80,14 +78,14 @@ class ProfileComparison:
     rows: list[dict[Hashable, Any]]
 
     @property
-    def clause(self) -> str:
-        """The comparison as a clause that follows the engine's name."""
+    def sentence(self) -> str:
+        """The comparison in one sentence."""
         parts = [row["part"] for row in self.rows]
         most = sum(part > 0.5 for part in parts)
         are = "is mostly a setting error" if most == 1 else "are mostly setting errors"
         return (
-            f"{most} of its {counted(len(parts), 'error')} above {SMALLEST_STATED:g} at the finest time step {are} "
-            f"(median share {100 * statistics.median(parts):.1f} %)"
+            f"{self.engine}: {most} of its {counted(len(parts), 'error')} above {SMALLEST_STATED:g} at the finest time step {are} "
+            f"(median share {100 * statistics.median(parts):.1f} %)."
         )
 
 
@@ -153,45 +151,35 @@ def _known(results: Results, tally: Counts) -> str:
     for rows, what in ((tally.known, "error"), (tally.limited, "limitation")):
         if len(rows):
             shows = counted(len(rows), f"value shows a known {what}", f"values show known {what}s")
-            parts += f"; {shows} of {_named([engine for engine in results.engines if engine in set(rows['engine'])], 'engine')}"
+            parts += f"; {shows} of {named([engine for engine in results.engines if engine in set(rows['engine'])], 'engine')}"
             parts += f" in {counted(rows['scene'].nunique(), 'scene')}" if what == "error" else ""
     return parts + (f"; {counted(tally.fixed, 'expected fault does', 'expected faults do')} not occur" if tally.fixed else "")
 
 
-def finding_sentences(results: Results, profiles: Sequence[ProfileComparison]) -> list[str]:
-    """One sentence for each engine, and one for all errors that the time steps leave undecided.
+def missing_engines(results: Results) -> list[str]:
+    """A sentence for each engine that is missing: why."""
+    return list(results.table.loc[results.table["verdict"] == "missing"].drop_duplicates("engine")["reason"])
+
+
+def finding_sentences(results: Results) -> list[str]:
+    """One sentence for each engine that is not missing.
 
     The sentence gives the number of scenes in which the engine converges, the number with each other status, its largest error that
-    is known or does not vanish as dt → 0, and the cost of a time step. The sentence of a missing engine gives the reason why it is missing.
-
-    Args:
-        results: The run.
-        profiles: Engines with default settings compared with the calibrated ones.
+    is known or does not vanish as dt → 0, and the cost of a time step.
     """
-    missing = results.table[results.table["verdict"] == "missing"].drop_duplicates("engine").set_index("engine")["reason"]
     times, statuses, lasting = step_times(results), results.statuses(), results.asymptotic_errors("model", "setting")
     lasting = lasting[lasting["value"].abs() > SMALLEST_STATED]
-    sentences, undecided, hidden = [], [], False
+    missing, sentences = set(results.table.loc[results.table["verdict"] == "missing", "engine"]), []
     for engine in results.engines:
         if engine in missing:
-            sentences.append(str(missing[engine]))
             continue
         remain = set(lasting.loc[lasting["engine"] == engine, "scene"])
-        errors = results.table[(results.table["kind"] == "asymptotic_error") & (results.table["engine"] == engine)]
-        opened = errors[is_undecided(errors) & ~errors["metric"].isin(JUMPING)]
         parts = [
             _convergence(results, engine, {scene: of[engine] for scene, of in statuses.items()}, remain),
-            *(profile.clause for profile in profiles if profile.engine == engine),
             *_cost(engine, times, results.provenance.get("compilation", {}).get(engine)),
         ]
         sentences.append(f"{ENGINE_NAMES.get(engine, engine)}: {'; '.join(parts)}.")
-        if len(opened):
-            scenes = list(opened["scene"].unique())
-            names = [quantity(metric) for metric in opened["metric"].unique()]
-            undecided.append(f"{engine} in {_named(scenes, 'scene')} ({', '.join(names[:MOST_NAMED])}{', …' * (len(names) > MOST_NAMED)})")
-            hidden |= any(statuses[scene][engine].words != UNDECIDED for scene in scenes)
-    also = ", also in scenes counted otherwise" if hidden else ""
-    return [*sentences, *([f"Undecided as dt → 0{also}: {'; '.join(undecided)}."] if undecided else [])]
+    return sentences
 
 
 def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], remain: Collection[str]) -> str:
@@ -223,16 +211,8 @@ def _largest(results: Results, errors: "pd.DataFrame") -> str:
     similar = errors["value"].abs().between(SAME_SIZE * abs(first["value"]), abs(first["value"]) / SAME_SIZE)
     equal = errors[(errors["metric"] == first["metric"]) & (sizes >= SAME_SIZE * sizes.max()) & similar]
     size = with_unit(formatted(abs(first["value"])), first["unit"])
-    names = _named(list(equal["scene"].unique()), "scene")
+    names = named(list(equal["scene"].unique()), "scene")
     return f"; largest error {quantity(first['metric'])} {size} at dt = {in_ms(first['dt'])} in {names}"
-
-
-def _named(names: Collection[str], kind: str) -> str:
-    """Names if they are few, otherwise their number."""
-    if len(names) > MOST_NAMED:
-        return f"{len(names)} {kind}s"
-    *others, last = names
-    return f"{', '.join(others)} and {last}" if others else last
 
 
 def _cost(engine: str, times: Mapping[str, float], compilation: float | None) -> list[str]:

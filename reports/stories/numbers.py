@@ -10,6 +10,8 @@ from dropspin.comparisons.judging.verdicts import WORDS
 from dropspin.comparisons.measuring.symmetries import kind_of
 from dropspin.scenarios.text import counted, rounded
 
+MOST_NAMED = 3
+"""Scenes, metrics or engines that a sentence names; of more it has the number."""
 Item = TypeVar("Item")
 Key = TypeVar("Key")
 
@@ -66,6 +68,14 @@ def capitalized(sentence: str) -> str:
 def listed(names: Sequence[str], most: int = 4) -> str:
     """The first names, separated by commas, and the number of the others."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def named(names: Sequence[str], kind: str, most: int = MOST_NAMED) -> str:
+    """Names if they are few, otherwise their number."""
+    if len(names) > most:
+        return f"{len(names)} {kind}s"
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def grouped(items: Iterable[Item], key: Callable[[Item], Key]) -> dict[Key, list[Item]]:

@@ -8,12 +8,14 @@ from dropspin.comparisons.results.results import Results, Status
 from dropspin.comparisons.running.forecast import Forecast
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
+from dropspin.reports.stories.conclusion import conclusion
 from dropspin.reports.stories.failures import Failure, failure_parts, failures, reproduce_drawn
 from dropspin.reports.stories.findings import (
     Counts,
     ProfileComparison,
     counts,
     finding_sentences,
+    missing_engines,
     profile_comparisons,
     verdict_sentence,
 )
@@ -28,7 +30,9 @@ class Overview:
 
     Attributes:
         verdict: The outcome of the checks in one sentence.
-        findings: What a quick run left out, the main finding on each engine, and the command that draws the same random scenes again.
+        conclusion: What a quick run left out, engines that are missing or have default settings, which engine to use for which quantity,
+            and the command that draws the same random scenes again.
+        findings: The main finding on each engine.
         counts: The number of checks with each verdict.
         statuses: The status of each engine in each scene, by scene and engine.
         profiles: Engines with default settings compared with the calibrated ones.
@@ -37,6 +41,7 @@ class Overview:
     """
 
     verdict: str
+    conclusion: Sequence[str]
     findings: Sequence[str]
     counts: Counts
     statuses: Mapping[str, Mapping[str, Status]]
@@ -48,12 +53,21 @@ class Overview:
 def overview(results: Results) -> Overview:
     """The overview of a run."""
     tally, profiles = counts(results), profile_comparisons(results)
-    findings = [*_quick(results), *finding_sentences(results, profiles), *reproduce_drawn(results)]
-    return Overview(verdict_sentence(results, tally), findings, tally, results.statuses(), profiles, failures(results), law_rows(results))
+    about_engines = [*missing_engines(results), *(profile.sentence for profile in profiles)]
+    return Overview(
+        verdict=verdict_sentence(results, tally),
+        conclusion=[*_quick(results), *about_engines, *conclusion(results), *reproduce_drawn(results)],
+        findings=finding_sentences(results),
+        counts=tally,
+        statuses=results.statuses(),
+        profiles=profiles,
+        failures=failures(results),
+        laws=law_rows(results),
+    )
 
 
 def document(results: Results, summary: Overview, tables: Sequence[Part] = ()) -> Document:
-    """A short report: findings, the status of each engine in each scene, distances to other impact laws, and failures.
+    """A short report: the conclusion, a finding on each engine, its status in each scene, distances to other impact laws, and failures.
 
     Args:
         results: The run.
@@ -64,12 +78,7 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = ()) -
         {"scene": scene, **{engine: f"{status.mark} {status.words}" for engine, status in by_engine.items()}}
         for scene, by_engine in summary.statuses.items()
     ]
-    laws: list[Part] = []
-    if summary.laws:
-        differing = counted(len({row["scene"] for row in summary.laws}), "scene")
-        others = "the report lists each engine's distances to the other laws, which are not errors."
-        laws = [Paragraph(NOTE, on_terminal=False), Table(summary.laws, on_terminal=False)]
-        laws.append(Paragraph(f"Impact laws differ in {differing}: {others}", style="dim", on_page=False))
+    laws: list[Part] = [Paragraph(NOTE), Table(summary.laws)] if summary.laws else []
     failed = [f"✗ {failure.sentence}" for failure in summary.failures]
     listed = Sentences(failed, commands=[failure.reproduce for failure in summary.failures], on_terminal=False)
     versions = ", ".join(f"{name} {version or 'not installed'}" for name, version in results.provenance["versions"].items())
@@ -77,16 +86,16 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = ()) -
     parts = [
         *tables,
         Heading("Summary", on_page=False, on_terminal=bool(tables)),
-        Sentences(summary.findings, on_page=False),
+        Sentences(summary.findings, on_terminal=False),
         Table(matrix, [*reversed(results.engines)], on_page=False),
         Sentences(notes, style="dim", on_page=False),
         Table(statuses, on_terminal=False),
-        *laws,
+        *(replace(part, on_terminal=False) for part in laws),
         listed,
         *(replace(part, on_page=False) for part in failure_parts(results, [one for one in summary.failures if not one.accepted])),
         Paragraph(f"{versions} on {results.provenance['cpu']}", on_terminal=False),
     ]
-    return Document("dropspin", parts, [Paragraph(summary.verdict, style="bold"), Sentences(summary.findings, on_terminal=False)])
+    return Document("dropspin", parts, [Sentences(summary.conclusion), Paragraph(summary.verdict, style="bold")])
 
 
 def _quick(results: Results) -> list[str]:

@@ -1,0 +1,148 @@
+"""What a run says about its engines: which one keeps a quantity within a tolerance, at which time steps, and in which scenes not."""
+
+import math
+import statistics
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS
+from dropspin.comparisons.results.results import Results, relative_sizes
+from dropspin.scenarios import Scenario
+
+WITHIN = 0.01
+"""The share of its scale that an error may have, unless another one is asked for."""
+QUESTIONS = ("energy_error", "bounce_height_error", "angular_momentum_error", "orientation_error", "position_error")
+"""The metrics that a conclusion may be about, those that are named first where there are many."""
+ENOUGH = 3
+"""Scenes that must test a question before an engine is recommended for it."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a run says about one engine and one metric. Its scenes are those in which any engine has an error in this metric.
+
+    Attributes:
+        metric: The metric.
+        engine: The engine's label.
+        scenes: The number of scenes that test the metric.
+        within: The scenes in which the error is within the tolerance, at `dt` and at each smaller time step that was tried.
+        beyond: The scenes in which it is not at the finest time step, or in which the engine broke down there.
+        undecided: The scenes in which the error at the finest time step is as near to the tolerance as its own uncertainty.
+        dt: The largest time step [s] at which it is within the tolerance in each scene of `within`; NaN if there is no such scene.
+        steps: The time steps [s] that were tried in each scene of `within`, smallest first.
+        condition: What at least two scenes of `beyond`, and none of the others, have: of `CONDITIONS` the one that most have; or empty.
+        named: The scenes of `beyond` that do not have it.
+        largest: The largest error of `beyond` at the finest time step, relative to its scale; NaN without one.
+        cost: Median of the computing time per simulated second, at `dt`; NaN if it was not measured.
+    """
+
+    metric: str
+    engine: str
+    scenes: int
+    within: tuple[str, ...]
+    beyond: tuple[str, ...]
+    undecided: tuple[str, ...]
+    dt: float
+    steps: tuple[float, ...]
+    condition: str
+    named: tuple[str, ...]
+    largest: float
+    cost: float
+
+    @property
+    def is_recommended(self) -> bool:
+        """Whether it is within the tolerance in enough scenes, and in most of those that test it."""
+        return not math.isnan(self.dt) and len(self.within) >= ENOUGH and len(self.within) > len(self.beyond) + len(self.undecided)
+
+
+def _has_coulomb_friction(scene: Scenario) -> bool:
+    return any(0.0 < surface.coefficient < np.inf for surface in scene.surfaces)
+
+
+def _strikes_with_a_corner(scene: Scenario) -> bool:
+    return scene.floor is not None and scene.body.shape != "sphere" and scene.starts_above_floor
+
+
+CONDITIONS: Mapping[str, Callable[[Scenario], bool]] = {
+    "Coulomb friction": _has_coulomb_friction,
+    "a floor": lambda scene: scene.floor is not None,
+    "a body that is not a ball, dropped on a floor": _strikes_with_a_corner,
+    "a body that spins at the start": lambda scene: any(scene.start.angular_velocity),
+    "damping": lambda scene: scene.damping is not None,
+}
+"""What may set the scenes apart in which an engine errs."""
+
+
+def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
+    """The answers of a run, for each metric of `QUESTIONS` that it has and each engine that was tried in one of its scenes.
+
+    An error is within the tolerance if its size plus its uncertainty, the column `tolerance`, is; it is beyond if its size minus that
+    uncertainty is. A time step at which the engine broke down is beyond.
+
+    Args:
+        results: The run.
+        within: The tolerance: the largest error relative to its scale, which is 1 for ratios and radians, and the lengths of the scene for
+            positions.
+    """
+    table = results.table
+    is_broken = table["verdict"].isin(BREAKDOWNS)
+    tried = table[table["dt"].notna() & (table["kind"].isin(["truth", "invariant"]) | is_broken)]
+    errors = table[(table["kind"] == "truth") & table["metric"].isin(QUESTIONS)]
+    sizes = np.array(relative_sizes(errors, results.scenes))
+    uncertain = np.array(relative_sizes(errors.assign(value=errors["tolerance"].fillna(0.0)), results.scenes))
+    states = np.select([sizes + uncertain <= within, sizes - uncertain > within], ["within", "beyond"], "undecided")
+    found = errors.assign(size=sizes, state=states, cost=errors["time_per_step"] / errors["dt"])
+    keys = ["engine", "scene", "dt"]
+    steps = dict.fromkeys(tried[keys].itertuples(index=False, name=None), _Error("undecided"))
+    broken = dict.fromkeys(table.loc[is_broken, keys].itertuples(index=False, name=None), _Error("beyond"))
+    answers = []
+    for metric in QUESTIONS:
+        rows = found[found["metric"] == metric]
+        own = dict(zip(rows[keys].itertuples(index=False, name=None), map(_Error, rows["state"], rows["size"], rows["cost"]), strict=True))
+        scenes = set(rows["scene"])
+        series: dict[str, dict[str, dict[float, _Error]]] = {engine: {} for engine in results.engines}
+        for (engine, scene, dt), error in (steps | own | broken).items():
+            if scene in scenes and engine in series:
+                series[engine].setdefault(scene, {})[dt] = error
+        answers += [_answer(metric, engine, len(scenes), of, results.scenes) for engine, of in series.items() if of]
+    return answers
+
+
+@dataclass(frozen=True)
+class _Error:
+    """An error at a time step: within the tolerance or not, its relative size, and the computing time per simulated second."""
+
+    state: str
+    size: float = math.nan
+    cost: float = math.nan
+
+
+def _answer(metric: str, engine: str, scenes: int, series: Mapping[str, Mapping[float, _Error]], models: Mapping[str, Scenario]) -> Answer:
+    """The answer from the errors of an engine by scene and time step."""
+    finest = {scene: errors[min(errors)] for scene, errors in series.items()}
+    of = {state: tuple(scene for scene, error in finest.items() if error.state == state) for state in ("within", "beyond", "undecided")}
+    kept = [series[scene] for scene in of["within"]]
+    common = sorted(set.intersection(*map(set, kept))) if kept else []
+    held = [dt for dt in common if all(error.state == "within" for errors in kept for step, error in errors.items() if step <= dt)]
+    beyond, others = of["beyond"], [models[scene] for scene in (*of["within"], *of["undecided"])]
+    only_beyond = {name: has for name, has in CONDITIONS.items() if not any(map(has, others))}
+    having = {name: {scene for scene in beyond if has(models[scene])} for name, has in only_beyond.items()}
+    condition = max(having, key=lambda name: len(having[name]), default="") if others else ""
+    covered = having[condition] if condition and len(having[condition]) > 1 else set()
+    largest = [finest[scene].size for scene in beyond]
+    dt = max(held, default=math.nan)
+    costs = [errors[dt].cost for errors in kept if dt in errors and not math.isnan(errors[dt].cost)]
+    return Answer(
+        metric=metric,
+        engine=engine,
+        scenes=scenes,
+        **of,
+        dt=dt,
+        steps=tuple(common),
+        condition=condition if covered else "",
+        named=tuple(scene for scene in beyond if scene not in covered),
+        largest=max((size for size in largest if not math.isnan(size)), default=math.nan),
+        cost=statistics.median(costs) if costs else math.nan,
+    )

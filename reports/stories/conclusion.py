@@ -1,0 +1,110 @@
+"""The conclusion of a run: for each question which engine to use, at which time step, and where not."""
+
+import math
+from collections.abc import Sequence
+
+from dropspin.comparisons.judging.convergence import JUMPING
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.results.conclusion import ENOUGH, WITHIN, Answer, conclude
+from dropspin.comparisons.results.results import Results, is_undecided
+from dropspin.reports.stories.matrix import step_times
+from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, named, quantity
+
+MOST_QUESTIONS = 3
+
+
+def conclusion(results: Results) -> list[str]:
+    """At most five sentences: one for each of the first questions, the cost, and what is undecided.
+
+    Where too few scenes test a question to recommend an engine for it, the sentences state what these scenes say, and what to run.
+    """
+    within = results.provenance["asked"].get("within") or WITHIN
+    questions = grouped(conclude(results, within), lambda answer: answer.metric)
+    tested = [answers for answers in questions.values() if answers[0].scenes >= ENOUGH]
+    if tested:
+        recommended = [_recommendation(answers, within) for answers in tested[:MOST_QUESTIONS]]
+        return [*recommended, *_cost(results), *_undecided(results)]
+    none = f"No recommendation: a question needs {ENOUGH} scenes that test it. dropspin run, without names, runs the core catalogue."
+    return [*(_statement(answers, within) for answers in list(questions.values())[:MOST_QUESTIONS]), none]
+
+
+def _recommendation(answers: Sequence[Answer], within: float) -> str:
+    """Which engines to use for a question that enough scenes test, the best first, and which not."""
+    ordered = sorted(answers, key=lambda answer: (-len(answer.within), math.isnan(answer.cost), answer.cost))
+    used = [f"{answer.engine} {_steps(answer)}{_exceptions(answer)}{_declined(answer)}" for answer in ordered if answer.is_recommended]
+    others = [f"{answer.engine} ({len(answer.within)} of {answer.scenes} scenes)" for answer in ordered if not answer.is_recommended]
+    question, rest = f"For {_tolerance(answers[0].metric, within)}", ", ".join(others)
+    if not used:
+        return f"{question} no engine is recommended: {rest} keep it."
+    return f"{question} use {'; '.join(used)}{f'; not {rest}' if others else ''}."
+
+
+def _statement(answers: Sequence[Answer], within: float) -> str:
+    """What a few scenes say about a question; engines of which they say the same are named together."""
+    said: dict[str, list[str]] = {}
+    for answer in answers:
+        clauses = [
+            (f"{{}} {_steps(answer)}", answer.within),
+            (f"not {{}}{_size(answer)}", answer.beyond),
+            ("undecided for {}", answer.undecided),
+        ]
+        for clause, scenes in clauses:
+            if scenes:
+                where = f" in {named(scenes, 'scene')}" if answer.scenes > 1 else ""
+                said.setdefault(clause + where, []).append(answer.engine)
+    text = _tolerance(answers[0].metric, within)
+    clauses_of = (clause.format(named(engines, "engine", len(engines))) for clause, engines in said.items())
+    return f"{text[0].upper()}{text[1:]}: {'; '.join(clauses_of)}."
+
+
+def _tolerance(metric: str, within: float) -> str:
+    """A quantity with the largest error that is asked for."""
+    unit = METRICS[metric].unit
+    of = {"1": f"{100 * within:g} %", "m": f"{100 * within:g} % of the scene's lengths"}.get(unit, f"{within:g} {unit}")
+    return f"{quantity(metric)} within {of}"
+
+
+def _size(answer: Answer) -> str:
+    """The largest error in brackets; empty if the engine broke down in each of its scenes."""
+    if math.isnan(answer.largest):
+        return ""
+    unit = METRICS[answer.metric].unit
+    return f" ({formatted(answer.largest)} {unit})" if unit == "rad" else f" ({100 * answer.largest:.3g} %)"
+
+
+def _steps(answer: Answer) -> str:
+    """The time steps at which an engine is within the tolerance."""
+    if math.isnan(answer.dt):
+        return "at the finest step of each scene"
+    if len(answer.steps) > 1 and answer.dt == answer.steps[-1]:
+        return "at any step tried"
+    return f"at {in_ms(answer.dt)}{' or less' if answer.dt > answer.steps[0] else ''}"
+
+
+def _exceptions(answer: Answer) -> str:
+    """The scenes in which an engine is not within the tolerance, or not known to be."""
+    parts = [f"with {answer.condition} ({len(answer.beyond) - len(answer.named)} scenes)"] if answer.condition else []
+    parts += [f"in {named(answer.named, 'scene')}"] if answer.named else []
+    except_ = f", except {' and '.join(parts)}" if parts else ""
+    return f"{except_}, undecided in {named(answer.undecided, 'scene')}" if answer.undecided else except_
+
+
+def _declined(answer: Answer) -> str:
+    """The number of scenes in which an engine has no result."""
+    count = answer.scenes - len(answer.within) - len(answer.beyond) - len(answer.undecided)
+    return f" (declines {count})" if count else ""
+
+
+def _cost(results: Results) -> list[str]:
+    """What a second of motion costs with each engine at the finest time step, the cheapest first; none if no engine was timed."""
+    dt = results.table["dt"].min()
+    times = {engine: time / dt for engine, time in step_times(results).items() if not math.isnan(time)}
+    costs = [f"{engine} {duration(float(f'{times[engine]:.2g}'))}" for engine in sorted(times, key=times.__getitem__)]
+    return [f"1 s of motion at dt = {in_ms(dt)} takes {', '.join(costs)}."] if costs else []
+
+
+def _undecided(results: Results) -> list[str]:
+    """A sentence on the errors of which the time steps do not show whether they vanish; none if there are none."""
+    errors = results.table[is_undecided(results.table) & ~results.table["metric"].isin(JUMPING)]
+    parts = [f"{engine} in {named(list(rows['scene'].unique()), 'scene')}" for engine, rows in errors.groupby("engine", sort=False)]
+    return [f"Undecided as dt → 0: {'; '.join(parts)}."] if parts else []

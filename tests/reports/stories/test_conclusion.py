@@ -1,0 +1,188 @@
+"""Each claim of a conclusion is recomputed from the rows of the run, by reading the sentence."""
+
+import math
+import re
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+import dropspin as ds
+from dropspin.comparisons.measuring.tolerances import scale
+from dropspin.comparisons.results.conclusion import CONDITIONS
+from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.results.table import Measurement, as_table
+from dropspin.reports.stories.conclusion import conclusion
+
+SCENES = {
+    name: ds.load(name)
+    for name in ("drop-ball", "drop-ball-slipping", "drop-box-edge", "drop-box-turning", "fall-damped", "slide-box", "spin-asymmetric")
+}
+METRICS = {"energy": "energy_error", "bounce height": "bounce_height_error", "angular momentum": "angular_momentum_error"}
+METRICS |= {"orientation": "orientation_error", "position": "position_error"}
+UNITS = {"orientation_error": "rad", "position_error": "m"}
+ENGINES = ("a", "mujoco[integrator=rk4,cone=elliptic]", "an other", "c")
+STEPS = (4e-3, 2e-3, 1e-3, 2.5e-4)
+COUNT = 60
+"""Random runs, a tenth of a second each."""
+
+
+def random_run(random, within):
+    """A run with all that a table may have: breakdowns, declining and missing engines, undefined values, ties, near misses."""
+    scenes = list(random.permutation(list(SCENES))[: random.integers(1, 8)])
+    engines, steps = ENGINES[: random.integers(1, 5)], STEPS[: random.integers(1, 5)]
+    metrics, quality = list(random.permutation(list(METRICS.values()))[: random.integers(1, 6)]), random.uniform(0.0, 3.0, len(engines))
+    rows = []
+    for scene in scenes:
+        for engine, good in zip(engines, quality, strict=True):
+            fate = random.choice(["tried", "declined", "missing", "diverged"], p=[0.85, 0.07, 0.04, 0.04])
+            for dt in steps[random.random() < 0.1 and len(steps) > 1 :]:
+                outcome = random.choice(["tried", "crashed", "timed_out"], p=[0.95, 0.03, 0.02]) if fate == "tried" else fate
+                case = {"scene": scene, "engine": engine, "dt": math.nan if outcome == "missing" else dt}
+                if outcome != "tried":
+                    rows.append(Measurement(**case, verdict=outcome))
+                    continue
+                rows.append(Measurement(**case, kind="invariant", metric="penetration", unit="m", value=0.0, verdict="measured"))
+                rows += [random_error(random, within, good, case, metric) for metric in metrics if random.random() < 0.97]
+    return Results(as_table(rows), {name: SCENES[name] for name in scenes}, engines, {}, provenance={"asked": {"within": within}})
+
+
+def random_error(random, within, good, case, metric):
+    unit = UNITS.get(metric, "1")
+    largest = within * scale(SCENES[case["scene"]], unit)
+    sizes = [0.0, 1.0, 10 ** (1.0 - good * random.random()), math.nan, math.inf]
+    value = largest * random.choice([-1.0, 1.0]) * random.choice(sizes, p=[0.1, 0.1, 0.74, 0.03, 0.03])
+    tolerance, time = largest * random.choice([math.nan, 0.0, 0.3]), random.choice([math.nan, 1e-6])
+    shown = {"value": value, "unit": unit, "tolerance": tolerance, "time_per_step": time}
+    return Measurement(**case, kind="truth", metric=metric, verdict="measured", **shown)
+
+
+@lru_cache(maxsize=1)
+def records(run):
+    return run.table.to_dict("records")
+
+
+@lru_cache
+def state(run, metric, engine, scene, dt):
+    """What the rows say about an engine at a time step: within the tolerance, beyond it, undecided, or not tried."""
+    rows = [row for row in records(run) if (row["engine"], row["scene"], row["dt"]) == (engine, scene, dt)]
+    if any(row["verdict"] in ("broken", "crashed", "timed_out", "diverged") for row in rows):
+        return "beyond"
+    errors = [row for row in rows if row["metric"] == metric and row["kind"] == "truth"]
+    if not errors:
+        return "undecided" if any(row["kind"] == "invariant" for row in rows) else ""
+    [row] = errors
+    largest = run.provenance["asked"]["within"] * scale(SCENES[scene], row["unit"])
+    unsure = 0.0 if math.isnan(row["tolerance"]) else row["tolerance"]
+    if abs(row["value"]) + unsure <= largest:
+        return "within"
+    return "beyond" if abs(row["value"]) - unsure > largest else "undecided"
+
+
+def states(run, metric, engine, scene):
+    """By time step at which the engine was tried, smallest first."""
+    found = {dt: state(run, metric, engine, scene, dt) for dt in sorted(STEPS)}
+    return {dt: one for dt, one in found.items() if one}
+
+
+def named(text, scenes):
+    """Whether a list names these scenes, or their number if they are more than three."""
+    return set(re.split(", | and ", text)) == set(scenes) if len(scenes) <= 3 else text == f"{len(scenes)} scenes"
+
+
+STEP = r"at (?:(?P<any>any step tried)|(?P<dt>\S+) ms(?P<less> or less)?|the finest step of each scene)"
+SAID = re.compile(rf"(?P<no>not |undecided for )?(?P<engines>.+?)(?: {STEP}| \((?P<size>\S+) (?:%|rad)\))?(?: in (?P<scenes>.+))?")
+USED = re.compile(
+    rf"{STEP}(?:, except (?:with (?P<condition>.+) \((?P<covered>\d+) scenes\))?(?: and )?(?:in (?P<named>.+?))?)?"
+    r"(?:, undecided in (?P<undecided>.+?))?(?: \(declines (?P<declined>\d+)\))?"
+)
+
+
+def verify_use(run, metric, engine, clause):
+    """A clause that recommends an engine."""
+    said = USED.fullmatch(clause)
+    assert said, clause
+    tested = {row["scene"] for row in records(run) if row["metric"] == metric and row["kind"] == "truth"}
+    of = {scene: states(run, metric, engine, scene) for scene in tested}
+    finest = {scene: found[min(found)] for scene, found in of.items() if found}
+    kinds = {kind: {scene for scene, one in finest.items() if one == kind} for kind in ("within", "beyond", "undecided")}
+    assert len(tested) >= 3
+    assert len(kinds["within"]) >= 3
+    assert len(kinds["within"]) > len(kinds["beyond"] | kinds["undecided"])
+    common = sorted(set.intersection(*(set(of[scene]) for scene in kinds["within"])))  # no step is named that was not tried
+    held = [all(one == "within" for scene in kinds["within"] for at, one in of[scene].items() if at <= step) for step in common]
+    dt = common[-1] if said["any"] else 1e-3 * float(said["dt"])
+    assert dt in STEPS
+    assert dt == max(step for step, has_held in zip(common, held, strict=True) if has_held)
+    assert bool(said["less"]) == (not said["any"] and dt > common[0])
+    assert said["any"] or len(common) == 1 or dt < common[-1]
+    covered = {scene for scene in tested if said["condition"] and CONDITIONS[said["condition"]](SCENES[scene])} & set(finest)
+    assert covered <= kinds["beyond"]
+    assert len(covered) == int(said["covered"] or 0)
+    rest = kinds["beyond"] - covered
+    assert named(said["named"], rest) if rest else said["named"] is None
+    assert named(said["undecided"], kinds["undecided"]) if kinds["undecided"] else said["undecided"] is None
+    assert int(said["declined"] or 0) == len(tested) - len(finest)
+
+
+def verify_count(run, metric, engine, within, scenes):
+    """The number of scenes of an engine that is not recommended."""
+    tested = {row["scene"] for row in records(run) if row["metric"] == metric and row["kind"] == "truth"}
+    of = [found for scene in tested if (found := states(run, metric, engine, scene))]
+    kept = [found for found in of if found[min(found)] == "within"]
+    assert (len(kept), len(tested)) == (within, scenes)
+    assert len(kept) < 3 or 2 * len(kept) <= len(of) or len(set(map(tuple, kept))) > 1
+
+
+def verify_statement(run, metric, sentence):
+    """A sentence on fewer than three scenes."""
+    tested = {row["scene"] for row in records(run) if row["metric"] == metric and row["kind"] == "truth"}
+    assert len(tested) < 3
+    said = set()
+    for clause in sentence.split("; "):
+        parts = SAID.fullmatch(clause)
+        scenes = re.split(" and ", parts["scenes"]) if parts["scenes"] else tested
+        for engine in [engine for engine in run.engines if engine in re.split(r", (?![a-z]+=)| and ", parts["engines"])]:
+            for scene in scenes:
+                found = states(run, metric, engine, scene)
+                expected = {"not ": "beyond", "undecided for ": "undecided", None: "within"}[parts["no"]]
+                assert found[min(found)] == expected
+                said.add((engine, scene))
+                if parts["dt"] or parts["any"]:
+                    dt = 1e-3 * float(parts["dt"]) if parts["dt"] else max(found)
+                    assert dt in found
+                    assert all(one == "within" for step, one in found.items() if step <= dt)
+    assert said == {(engine, scene) for engine in run.engines for scene in tested if states(run, metric, engine, scene)}
+
+
+@pytest.mark.parametrize("seed", range(COUNT))
+def test_each_claim_is_that_of_the_rows(seed):
+    random = np.random.default_rng(seed)
+    run = random_run(random, random.choice([0.01, 1e-3, 0.5]))
+    within = run.provenance["asked"]["within"]
+    sentences = conclusion(run)
+    assert 1 <= len(sentences) <= 5
+    for sentence in sentences:
+        size = rf"within (?:{100 * within:g} %(?: of the scene's lengths)?|{within:g} rad)"
+        if used := re.fullmatch(rf"For (.+) {size} use (.+)\.", sentence):
+            metric = METRICS[used[1]]
+            *clauses, last = used[2].split("; ")
+            not_used = last.removeprefix("not ") if last.startswith("not ") else ""
+            for clause in [*clauses, *([] if not_used else [last])]:
+                [engine] = [engine for engine in run.engines if clause.startswith(f"{engine} at ")]
+                verify_use(run, metric, engine, clause.removeprefix(f"{engine} "))
+            verify_counts(run, metric, not_used)
+        elif none := re.fullmatch(rf"For (.+) {size} no engine is recommended: (.+) keep it\.", sentence):
+            assert len(verify_counts(run, METRICS[none[1]], none[2])) > 0
+        elif few := re.fullmatch(rf"(.+) {size}: (.+)\.", sentence):
+            verify_statement(run, METRICS[few[1].lower()], few[2])
+        else:
+            assert re.match("1 s of motion|No recommendation: a question needs 3 scenes", sentence)
+
+
+def verify_counts(run, metric, text):
+    found = re.findall(r"(.+?) \((\d+) of (\d+) scenes\)(?:, |$)", text)
+    for engine, within, scenes in found:
+        assert engine in run.engines
+        verify_count(run, metric, engine, int(within), int(scenes))
+    return found

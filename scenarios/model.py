@@ -54,6 +54,16 @@ class Ensemble(Table):
     angular_velocity: Annotated[tuple[NotNegative, ...], Field(min_length=3, max_length=3)] = (0.0, 0.0, 0.0)
 
 
+EARLIER_NAMES = {"document": "wang"}
+"""Engines by the names that they had in earlier versions."""
+
+
+def current_label(label: str) -> str:
+    """The label of an engine that may have the name of an earlier version."""
+    name, bracket, options = label.partition("[")
+    return EARLIER_NAMES.get(name, name) + bracket + options
+
+
 class Expectation(Table):
     """A bound on a metric, for all engines and time steps or for those given.
 
@@ -61,7 +71,7 @@ class Expectation(Table):
     """
 
     metric: Text
-    engine: Text | None = None
+    engine: Annotated[Text, AfterValidator(current_label)] | None = None
     dt: tuple[Positive, ...] | None = None
     below: Positive | None = None
     above: Number | None = None

@@ -15,6 +15,7 @@ from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissin
 from dropspin.comparisons.engines.exceptions import described
 from dropspin.comparisons.engines.packages import CANNON_ES, HAVOK, JOLT, RAPIER_JS, is_npm, npm_package
 from dropspin.scenarios.errors import DropspinError, UnknownName
+from dropspin.scenarios.model import EARLIER_NAMES
 from dropspin.scenarios.validation import shown
 
 
@@ -104,7 +105,7 @@ def parsed(name: str) -> tuple[str, dict[str, str]]:
     match = re.fullmatch(r"\s*([\w.:-]+)\s*(?:\[(.*)\])?\s*", name)
     if match is None:
         raise DropspinError(f"engine {name!r}: write a name, or a name with options, such as mujoco[integrator=rk4].")
-    return match.group(1), _options(name, match.group(2) or "")
+    return EARLIER_NAMES.get(match.group(1), match.group(1)), _options(name, match.group(2) or "")
 
 
 def constructed(base: str, options: Mapping[str, str]) -> Engine:
@@ -191,7 +192,7 @@ def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
             f"engine {name!r}: {attribute}.name is {shown(given)}; "
             "give it a name for results, of letters, digits, - and _, such as 'my-engine'."
         )
-    if given in BUILT_IN:
+    if given in BUILT_IN or given in EARLIER_NAMES:
         raise DropspinError(f"engine {name!r}: {attribute}.name is {given!r}, which is a built-in engine; results need another name.")
     return adapter
 

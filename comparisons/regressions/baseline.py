@@ -29,6 +29,7 @@ from dropspin.comparisons.results.table import OF_SYMMETRIES
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import did_you_mean
 from dropspin.scenarios.loading import read_toml
+from dropspin.scenarios.model import current_label
 from dropspin.scenarios.tables import Table
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import shown, validated
@@ -145,22 +146,25 @@ def load_baseline(path: str | Path) -> Baseline:
         )
     written = validated(_File, where, content)
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
-    for scene in written.results:
+    for scene, of_scene in written.results.items():
         if scene not in written.scenes:
             raise DropspinError(f"{where}: scenes: {scene!r} has results, but no digest; accept them again.")
+        if len({*map(current_label, of_scene)}) < len(of_scene):
+            raise DropspinError(f"{where}: results of {scene}: an engine is listed by two names; remove the lines of the earlier one.")
     rows = [_row(where, keys, content, acceptances) for keys, content in leaves(written.results, 4)]
     motions: dict[str, dict[tuple[str, str, str], str]] = {}
     for (by, scene, engine, step), digest_of_motions in leaves(written.motions, 4):
         _verify_steps(f"{where}: motions of {scene}, {engine}", step)
-        motions.setdefault(by, {})[scene, engine, step] = digest_of_motions
-    return Baseline(acceptances, written.engines, written.scenes, motions, _table(rows))
+        motions.setdefault(by, {})[scene, current_label(engine), step] = digest_of_motions
+    engines = {current_label(label): name for label, name in written.engines.items()}
+    return Baseline(acceptances, engines, written.scenes, motions, _table(rows))
 
 
 def _row(where: str, keys: tuple[str, ...], content: Any, acceptances: Mapping[str, Acceptance]) -> dict[str, Any]:
     """A result of a file as a row of a table."""
     scene, engine, steps, name = keys
     _verify_steps(f"{where}: results of {scene}, {engine}", steps)
-    here = f"{where}: results of {scene}, {engine}, {steps}: {name}"
+    here = f"{where}: results of {scene}, {current_label(engine)}, {steps}: {name}"
     if name not in NAMES and kind_of(name) is None:
         raise DropspinError(f"{here}: no such result.{did_you_mean(name, NAMES)}")
     metric, kind = NAMES.get(name, (name, kind_of(name)))
@@ -168,7 +172,7 @@ def _row(where: str, keys: tuple[str, ...], content: Any, acceptances: Mapping[s
     if line.by not in acceptances:
         raise DropspinError(f"{here}: by: got {line.by!r}; accepted are {', '.join(acceptances) or 'none'}.")
     unit = "1" if kind in ("order", *OF_SYMMETRIES) else (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
-    identity = dict(zip(KEY, (scene, engine, steps, metric, kind), strict=True))
+    identity = dict(zip(KEY, (scene, current_label(engine), steps, metric, kind), strict=True))
     return identity | line.model_dump() | {"unit": unit}
 
 

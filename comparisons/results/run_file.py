@@ -16,7 +16,7 @@ from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import validated
 
 FORMAT = 6
-"""Of the folder; others are refused."""
+"""Of the folder; `earlier` reads the one before, others are refused."""
 FILE, TABLE = "run.json", "results.parquet"
 ARRAY_FILE = re.compile(r"(trajectories|ensembles)/[A-Za-z0-9][A-Za-z0-9.=_-]*\.npz")
 
@@ -81,7 +81,7 @@ class RunFile(_Table):
     """The content of `run.json`.
 
     Attributes:
-        format: `FORMAT`.
+        format: `FORMAT`, or that of `earlier`.
         provenance: As in `Results`.
         engines: The engines' labels, in order.
         scenes: The keys of each scene's file, by name.

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from dropspin.comparisons.results import earlier
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, SAMPLES, EnsembleOutcome
 from dropspin.comparisons.results.folder import file_name, read_stored, sha256
 from dropspin.comparisons.results.results import Results, TrajectoryKey
@@ -71,8 +72,12 @@ def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
     """
     try:
         content = parsed(read_stored(Path(folder), FILE))
-        if isinstance(content, dict) and content.get("format") == FORMAT:
-            return _loaded(Path(folder), verified(content), content["provenance"], arrays)
+        if isinstance(content, dict) and content.get("format") in (FORMAT, earlier.FORMAT):
+            file = verified(content)
+            if file.format == earlier.FORMAT:
+                content = earlier.with_current_labels(content)
+                file = RunFile.model_validate(content)
+            return _loaded(Path(folder), file, content["provenance"], arrays)
     except (OSError, ValueError, DropspinError) as error:
         detail = " ".join((f"{error.filename}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)).split())
         raise DropspinError(
@@ -83,7 +88,8 @@ def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
 
 def _loaded(folder: Path, file: RunFile, provenance: Mapping[str, Any], arrays: bool) -> Results:
     scenes = {name: _scene(file, name) for name in file.scenes}
-    read_table = partial(results_table, scenes=scenes, engines=file.engines, dts=file.provenance.asked.dts)
+    is_earlier = file.format == earlier.FORMAT
+    read_table = partial(results_table, scenes=scenes, engines=file.engines, dts=file.provenance.asked.dts, is_earlier=is_earlier)
     rows = _from_file(folder, TABLE, file, read_table)
     read_outcome = partial(_outcome, most=QUICK_MEMBERS if file.provenance.asked.quick else None)
     trajectories = _arrays(folder, file, file.trajectories if arrays else {}, scenes, _trajectory)

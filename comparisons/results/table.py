@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 from dropspin.comparisons.judging.verdicts import VERDICTS, Basis, Cause, Judgement, Verdict
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.symmetries import kind_of
+from dropspin.comparisons.results.earlier import with_basis
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.validation import shown
@@ -159,7 +160,9 @@ def stored_table(content: bytes, schema: pa.Schema, *, with_others: bool = False
     return table
 
 
-def results_table(content: bytes, scenes: Mapping[str, Scenario], engines: Collection[str], dts: Collection[float]) -> pd.DataFrame:
+def results_table(
+    content: bytes, scenes: Mapping[str, Scenario], engines: Collection[str], dts: Collection[float], *, is_earlier: bool = False
+) -> pd.DataFrame:
     """The table of a run in the file `results.parquet`.
 
     Args:
@@ -167,6 +170,7 @@ def results_table(content: bytes, scenes: Mapping[str, Scenario], engines: Colle
         scenes: The scenes of the run.
         engines: Labels of its engines.
         dts: Its time steps [s].
+        is_earlier: Whether the folder has the format that `earlier` reads.
 
     Returns:
         The table, with the columns and types of `COLUMNS`.
@@ -175,7 +179,10 @@ def results_table(content: bytes, scenes: Mapping[str, Scenario], engines: Colle
         ValueError: It has other columns, types or rows than a run of these scenes with these engines and time steps.
         Exception: As `stored_table`.
     """
-    rows = stored_table(content, schema_of(COLUMNS)).to_pandas().astype(COLUMNS)
+    names = [name for name in COLUMNS if not (is_earlier and name == "basis")]
+    rows = stored_table(content, schema_of(names)).to_pandas().astype({name: COLUMNS[name] for name in names})
+    if is_earlier:
+        rows = with_basis(rows)[list(COLUMNS)]
     _verify_rows(rows, scenes, engines, dts)
     return rows
 

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dropspin.comparisons.results.run_file import signed
 from dropspin.comparisons.results.store import load_results
 from dropspin.comparisons.running.run import run
 from dropspin.reports import run_folder
@@ -177,11 +178,32 @@ def test_a_loaded_run_equals_the_one_that_was_saved(results, folder):
     assert list(csv.columns) == list(results.table.columns)
 
 
+def test_a_run_of_the_earlier_format_is_read(tmp_path):
+    """Format 5 had no column for the basis of a verdict, which was the beginning of its reason, and another name for the engine `wang`."""
+    folder = write_report(run("spin-asymmetric", ["wang[rotation=rk4]", "wang"], [8e-3, 4e-3]), tmp_path / "run").parent
+    old = shutil.copytree(folder, tmp_path / "old")
+    rows = pd.read_parquet(old / "results.parquet").drop(columns="basis")
+    rows.loc[0, ["verdict", "reason"]] = "passed", "the known fault does not occur; its expectation can be removed: why"
+    rows[["engine", "truth"]] = rows[["engine", "truth"]].replace({"wang": "document", "wang[rotation=rk4]": "document[rotation=rk4]"})
+    rows.to_parquet(old / "results.parquet", index=False)
+    content = json.loads((old / "run.json").read_text(encoding="utf-8").replace('"wang', '"document'))
+    content["sha256"]["results.parquet"] = hashlib.sha256((old / "results.parquet").read_bytes()).hexdigest()
+    del content["sha256"]["run.json"]
+    (old / "run.json").write_text(signed(content | {"format": 5}), encoding="utf-8")
+    again, other, judged = load_results(old), load_results(folder), ["basis", "verdict", "reason"]
+    assert again.table.loc[0, "basis"] == "fault_absent"
+    assert "an implementation of Wang's lecture note" in (folder / "report.html").read_text(encoding="utf-8")
+    assert again.engines == other.engines
+    assert again.trajectories.keys() == other.trajectories.keys()
+    for name in ("table", "agreements"):
+        pd.testing.assert_frame_equal(getattr(again, name).drop(columns=judged), getattr(other, name).drop(columns=judged))
+
+
 def test_a_run_of_an_older_format_is_refused_with_the_version_that_wrote_it(folder, tmp_path):
     old = shutil.copytree(folder, tmp_path / "old")
     content = json.loads((old / "run.json").read_text(encoding="utf-8"))
     content["provenance"]["versions"]["dropspin"] = "0.0.9"
-    (old / "run.json").write_text(json.dumps(content | {"format": 5}), encoding="utf-8")
+    (old / "run.json").write_text(json.dumps(content | {"format": 4}), encoding="utf-8")
     with pytest.raises(DropspinError, match=r"old: has a format of dropspin 0\.0\.9, which this version cannot read; run it again\.$"):
         load_results(old)
 

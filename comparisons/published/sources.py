@@ -69,7 +69,8 @@ class Source(Table):
         remarks: Sentences on what was found, and on what is left out.
         significant: Number of significant digits of every value, if the source drops trailing zeros; 0 if it does not.
         formula: A function of `formulas.py` that compares the source with an exact solution; empty if there is none.
-        parameters: The numbers that the function needs.
+        data: The folder of measured tosses that a user must have, in words; empty if none is needed.
+        parameters: The numbers that the function, or the runs of the tosses, need.
         scenes: The scenes by name, with the keys of a scene's file.
         groups: The values that engines are compared with.
     """
@@ -83,6 +84,7 @@ class Source(Table):
     remarks: tuple[str, ...] = ()
     significant: int = 0
     formula: str = ""
+    data: str = ""
     parameters: dict[str, Any] = Field(default_factory=dict)
     scenes: dict[str, dict[str, Any]] = Field(default_factory=dict)
     groups: tuple[Group, ...] = ()
@@ -92,13 +94,19 @@ class Source(Table):
         return from_mapping({"name": name, **self.scenes[name]})
 
 
+def source_names() -> list[str]:
+    """The names of all sources, in the order of their output."""
+    return sorted(path.stem for path in DATA.glob("*.toml"))
+
+
 def sources(names: Iterable[str] = ()) -> list[Source]:
-    """The sources of some names, or all.
+    """The sources of some names; without a name, all that need no data of the user's.
 
     Raises:
         UnknownName: There is no source of a name.
     """
-    known = sorted(path.stem for path in DATA.glob("*.toml"))
-    chosen = list(dict.fromkeys(names)) or known
+    known, names = source_names(), list(dict.fromkeys(names))
+    chosen = names or known
     verify_known("source", chosen, known)
-    return [Source.model_validate({"name": name, **read_toml(DATA / f"{name}.toml", name)}) for name in chosen]
+    found = [Source.model_validate({"name": name, **read_toml(DATA / f"{name}.toml", name)}) for name in chosen]
+    return found if names else [source for source in found if not source.data]

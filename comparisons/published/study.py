@@ -8,11 +8,12 @@ from dropspin.comparisons.published.formulas import FORMULAS
 from dropspin.comparisons.published.quantities import quantity
 from dropspin.comparisons.published.results import ABSENT, SHOWN, Result, agreement
 from dropspin.comparisons.published.sources import Case, Group, Source, sources
+from dropspin.comparisons.published.tosses import acosta_cube
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown, finite, try_record
-from dropspin.scenarios import Scenario
+from dropspin.scenarios import DropspinError, Scenario
 
 RESOURCES = ResourceLimits(processor_time=60.0)
 
@@ -20,13 +21,15 @@ RESOURCES = ResourceLimits(processor_time=60.0)
 def reproduce(
     names: Iterable[str] = (),
     *,
+    data: str | None = None,
     on_progress: Callable[[str, float], None] | None = None,
     resources: ResourceLimits = RESOURCES,
 ) -> list[Result]:
     """Run what published sources describe, and compare the values with the digits that they print.
 
     Args:
-        names: Names of sources; by default all.
+        names: Names of sources; by default all that need no data.
+        data: The folder of the measured tosses that a source needs.
         on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1.
         resources: The processor time [s] and memory [bytes] that an engine may use for one run.
 
@@ -35,9 +38,13 @@ def reproduce(
 
     Raises:
         UnknownName: There is no source of a name.
+        DropspinError: A source needs data that are not given, or that are not its own.
     """
     chosen, callback = sources(names), on_progress or ignore
-    total = sum(1 + sum(len(group.cases) for group in source.groups) for source in chosen)
+    for source in chosen:
+        if source.data and data is None:
+            raise DropspinError(f"{source.name}: needs {source.data}; give the folder: dropspin reproduce {source.name} DIR.")
+    total = sum(1 + len(source.parameters.get("runs", ())) + sum(len(group.cases) for group in source.groups) for source in chosen)
     results: list[Result] = []
     done = 0
     with EngineProcesses(resources) as processes:
@@ -45,6 +52,11 @@ def reproduce(
             callback(source.name, done / total)
             results += FORMULAS[source.formula](source) if source.formula else []
             done += 1
+            if source.data and data is not None:
+                for of_run in acosta_cube(source, data, processes):
+                    results += of_run
+                    done += 1
+                    callback(source.name, done / total)
             for group in source.groups:
                 entry = engine_entry(group.by) if group.by else EngineEntry("", None, "missing", group.why_not)
                 for case in group.cases:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @click.command("reproduce")
-@click.argument("names", nargs=-1, metavar="[SOURCE]...")
+@click.argument("names", nargs=-1, metavar="[SOURCE]... [DIR]")
 @time_limit_option(60.0, "an engine may use for one run")
 @output_option("out/reproduce", "for the tables")
 @as_json
@@ -20,11 +20,12 @@ def reproduce_command(names: tuple[str, ...], resources: "ResourceLimits", outpu
     """Compare published results with what engines and exact solutions give here.
 
     Each SOURCE has a citation, a scene, and the digits that it prints. Its scene is run, and the values are compared digit by digit; for
-    values that cannot be reproduced, the reason is printed. The default is all sources.
+    values that cannot be reproduced, the reason is printed. The default is all sources but acosta-cube, which needs DIR, a folder of
+    measured tosses.
 
     Exit code 1: a value differs that is claimed to be reproducible.
     """
-    from dropspin.comparisons.published.sources import sources
+    from dropspin.comparisons.published.sources import source_names, sources
     from dropspin.comparisons.published.study import reproduce
     from dropspin.comparisons.results.folder import study_folder
     from dropspin.reports.stories.reproduce import Reproduction, exit_code
@@ -32,10 +33,13 @@ def reproduce_command(names: tuple[str, ...], resources: "ResourceLimits", outpu
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.reports.terminal.rows import print_json_or
 
+    data = None
+    if len(names) > 1 and names[-1] not in source_names() and any(source.data for source in sources(names[:-1])):
+        names, data = names[:-1], names[-1]
     chosen = sources(names)
     with study_folder(output) as folder:
         with share_bar("reproduce") as on_progress:
-            results = reproduce(names, on_progress=on_progress, resources=resources)
+            results = reproduce(names, data=data, on_progress=on_progress, resources=resources)
         study = Reproduction(sources=chosen, results=results)
         document = write_study(study, folder)
     print_json_or(json_output, study.rows(), document, os.path.join(output, "reproduce.md"))

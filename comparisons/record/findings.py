@@ -21,7 +21,7 @@ from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.measuring.tolerances import NEGLIGIBLE, scale, tolerance
 from dropspin.comparisons.record.plan import load_plan
-from dropspin.comparisons.record.store import MACHINE, OWN, Row, stored
+from dropspin.comparisons.record.store import MACHINE, OTHERS, OWN, Row, stored
 from dropspin.scenarios import DropspinError, load
 from dropspin.scenarios.loading import names
 
@@ -109,6 +109,39 @@ def read(folder: str | Path) -> dict[str, list[Release]]:
     if not any(release.cases for releases in found.values() for release in releases):
         raise DropspinError(f"{folder}: has no result of a scene as the catalogue defines it today; dropspin record measures them again.")
     return found
+
+
+class Other(NamedTuple):
+    """A release that somebody else measured, which nothing proves.
+
+    Attributes:
+        name: The release.
+        first: One of its rows, with machine and date.
+        common: The number of simulations that were measured here too.
+        same: The number of these whose motion is the same, bit for bit.
+    """
+
+    name: str
+    first: Row
+    common: int
+    same: int
+
+
+def others(folder: str | Path, own: Mapping[str, Sequence[Release]]) -> dict[str, list[Other]]:
+    """What others measured of each engine, oldest release first, compared with what was measured here.
+
+    Raises:
+        DropspinError: A file is refused.
+    """
+    found: dict[str, list[Other]] = {}
+    for path in sorted((Path(folder) / OTHERS).glob("*.parquet")):
+        _, rows = stored(path)
+        engine, sent = rows[0]["engine"], release_of(rows)
+        here = next((release.cases for release in own.get(engine, ()) if release.name == sent.name), {})
+        pairs = [(case, here[key]) for key, case in sent.cases.items() if key in here]
+        same = sum((case.verdict, case.trajectory) == (mine.verdict, mine.trajectory) for case, mine in pairs)
+        found.setdefault(engine, []).append(Other(sent.name, sent.first, len(pairs), same))
+    return {engine: sorted(sent, key=lambda other: numbers_of(other.name)) for engine, sent in found.items()}
 
 
 def release_of(rows: Sequence[Row]) -> Release:

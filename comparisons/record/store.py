@@ -1,5 +1,6 @@
 """The folder of the record: a Parquet file for each engine, release and machine, whose name ends with the hash of its content.
 
+`origin=own` has what was measured here, `origin=unsigned` what others sent: a reader of partitioned Parquet files makes a column of that.
 A file is complete or absent, never changed, and whoever has it can verify it; the hash does not prove who measured it.
 """
 
@@ -26,7 +27,7 @@ from dropspin.comparisons.results.table import schema_of, stored_table
 from dropspin.scenarios import DropspinError
 
 Row = Mapping[str, Any]
-OWN = "origin=own"
+OWN, OTHERS = "origin=own", "origin=unsigned"
 RELEASES = "_releases.json"
 HASH = 16
 NAME = re.compile(r"([a-z][a-z-]*)-(\w[\w.+!]*)-([0-9a-f]{16})\.parquet", re.ASCII)
@@ -108,6 +109,25 @@ class Record:
                 old.unlink()
         return path
 
+    def merge(self, places: Iterable[str]) -> list[str]:
+        """Add files that others sent, unless the record has them.
+
+        Args:
+            places: Files of a record, or folders that have some, at any depth.
+
+        Returns:
+            The names of the files that were added.
+
+        Raises:
+            DropspinError: A file is refused; none is added then.
+        """
+        sent = {path.name: stored(path)[0] for place in places for path in _files(Path(place))}
+        new = sent.keys() - {path.name for path in self.folder.rglob("*.parquet")}
+        for name in new:
+            with written_whole(self.folder / OTHERS / name) as unfinished:
+                unfinished.write_bytes(sent[name])
+        return [name for name in sent if name in new]
+
 
 def stored(path: Path) -> tuple[bytes, list[dict[str, Any]]]:
     """The content and the rows of a file of the record: what `Record.write` wrote, with the hash of the content in its name.
@@ -130,6 +150,14 @@ def stored(path: Path) -> tuple[bytes, list[dict[str, Any]]]:
     except Exception as error:  # whatever pyarrow raises for a file that is none
         raise DropspinError(f"{path.name}: refused: {' '.join(str(error).split())}.") from None
     return content, rows
+
+
+def _files(place: Path) -> list[Path]:
+    """The Parquet files of a place."""
+    found = sorted(place.rglob("*.parquet")) if place.is_dir() else [place]
+    if not found or not place.exists():
+        raise DropspinError(f"{place}: has no file of a record; give a folder that dropspin record wrote, or a file in it.")
+    return found
 
 
 def _verify(rows: Sequence[Row], engine: str, release: str) -> None:

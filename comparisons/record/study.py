@@ -1,7 +1,8 @@
 """Record releases: those that the record does not have yet, several at a time."""
 
-from collections.abc import Callable, Collection
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Collection, Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import partial
 from importlib.util import find_spec
 from itertools import chain
@@ -14,6 +15,7 @@ from dropspin.comparisons.engines.registry import BUILT_IN
 from dropspin.comparisons.record.environments import measured, releases
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.record.store import Record, machine
+from dropspin.comparisons.running.cluster import connected
 from dropspin.comparisons.running.parallel import as_done
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios.errors import verify_known
@@ -26,6 +28,7 @@ def record(
     chosen: Collection[str] = (),
     *,
     jobs: int,
+    scheduler: str | None = None,
     time_limit: float,
     on_done: Callable[[str, int], None],
 ) -> None:
@@ -36,46 +39,59 @@ def record(
         plan: What to measure.
         engines: Names of engines; all by default.
         chosen: Releases; all by default.
-        jobs: How many to measure at a time.
+        jobs: How many to measure at a time on this machine.
+        scheduler: The address of a Dask scheduler, on whose workers to measure instead.
         time_limit: Processor time that an engine may use for one simulation [s].
         on_done: Called after each release with its name and what became of it, and with the number that is left.
 
     Raises:
-        DropspinError: There is no such engine or release, an index cannot be asked, or the record cannot be written.
+        DropspinError: There is no such engine or release, an index cannot be asked, the record cannot be written, or the scheduler does
+            not answer or is lost.
     """
     verify_known("engine of the record", engines, plan.engines)
     listed = {engine: releases(own.package, own.oldest) for engine, own in plan.engines.items() if engine in (engines or plan.engines)}
     verify_known("release", chosen, list(chain(*listed.values())))
     record.write_releases(listed)
     common = {engine: {"plan": plan.digest(engine), "adapter": _code(engine)} for engine in listed}
-    here = machine()
-    pending = [
-        (engine, release)
-        for engine, names in listed.items()
-        for release in names
-        if (not chosen or release in chosen) and not record.has(engine, release, common[engine] | here)
-    ]
-    stopping, left = Event(), len(pending)
-    with ThreadPoolExecutor(jobs) as threads:
+    with _workers(jobs, scheduler) as (workers, machines):
+        pending = [
+            (engine, release)
+            for engine, names in listed.items()
+            for release in names
+            if (not chosen or release in chosen) and not any(record.has(engine, release, common[engine] | one) for one in machines)
+        ]
+        stopping, left = None if scheduler else Event(), len(pending)
         try:
-            for done in as_done(threads, partial(_measured, plan, time_limit, stopping), iter(pending), lambda: len(pending)):
+            for done in as_done(workers, partial(_measured, plan, time_limit, stopping), iter(pending), lambda: len(pending)):
                 if done is not None:
-                    (engine, release), (rows, versions) = done
-                    record.write(engine, release, rows, common[engine] | here | versions)
+                    (engine, release), (rows, measured_on) = done
+                    record.write(engine, release, rows, common[engine] | measured_on)
                     left -= 1
                     results = sum(bool(row.get("metric")) for row in rows)
                     on_done(f"{engine} {release}: {f'{results} results' if results else rows[0]['reason']}", left)
         finally:
-            stopping.set()
+            if stopping is not None:
+                stopping.set()
 
 
-def _measured(plan: Plan, time_limit: float, stopping: Event, asked: tuple[str, str]) -> tuple[list[dict[str, Any]], dict[str, str]]:
-    """Measure a release: its rows, or one with the reason why it has no results; and the versions of packages."""
+@contextmanager
+def _workers(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, list[dict[str, str]]]]:
+    """What runs the work, threads of this process or the workers of a Dask scheduler, and the machines on which it runs."""
+    if scheduler is None:
+        with ThreadPoolExecutor(jobs) as threads:
+            yield threads, [machine()]
+        return
+    with connected(scheduler) as client:
+        yield client.get_executor(pure=False), list(client.run(machine).values())
+
+
+def _measured(plan: Plan, time_limit: float, stopping: Event | None, asked: tuple[str, str]) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """Measure a release, on a worker: its rows, or one with the reason why it has no results; the machine, and the versions of packages."""
     try:
-        found = measured(plan, *asked, time_limit, stopping)
+        found = measured(plan, *asked, time_limit, stopping or Event())
     except Breakdown as failure:
-        return [{"verdict": failure.verdict, "reason": str(failure)}], {}
-    return found["rows"], {"versions": found["versions"]}
+        return [{"verdict": failure.verdict, "reason": str(failure)}], machine()
+    return found["rows"], machine() | {"versions": found["versions"]}
 
 
 def _code(engine: str) -> str:

@@ -18,11 +18,12 @@ def record_publish_command(record: str, output: str) -> None:
     RECORD is the folder that dropspin record wrote. The site needs no server and no network. In a folder of the documentation's site, it
     links to the documentation.
     """
-    from dropspin.comparisons.record.findings import read
+    from dropspin.comparisons.record.findings import others, read
     from dropspin.comparisons.results.folder import replaced_folder
     from dropspin.reports.html.record import INDEX, Site, files_of_site
 
+    found = read(record)
     docs = "../" if (Path(output).resolve().parent / "problems.html").is_file() else ""
     with replaced_folder(output, files_of_site, "record publish") as folder:
-        Site(read(record), docs).write(folder)
+        Site(found, others(record, found), docs).write(folder)
     echo(f"Site: {os.path.join(output, INDEX)}")

@@ -11,7 +11,7 @@ from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.record import findings
-from dropspin.comparisons.record.findings import Case, Change, Release, leading, problem, relative_error
+from dropspin.comparisons.record.findings import Case, Change, Other, Release, leading, problem, relative_error
 from dropspin.reports.pages import page
 from dropspin.reports.plots.chart import Chart, Line
 from dropspin.reports.plots.chart_data import chart_data
@@ -34,11 +34,12 @@ class Site:
 
     Args:
         releases: The releases of each engine, oldest first.
+        others: What others measured of each engine.
         docs: Where the documentation is, relative to the pages, such as `../`; empty for nowhere.
     """
 
-    def __init__(self, releases: Mapping[str, list[Release]], docs: str = "") -> None:
-        self.releases, self.docs = releases, docs
+    def __init__(self, releases: Mapping[str, list[Release]], others: Mapping[str, list[Other]], docs: str = "") -> None:
+        self.releases, self.others, self.docs = releases, others, docs
         self.measured = {engine: found for engine, own in releases.items() if (found := [one for one in own if one.cases])}
         self.newest = {engine: own[-1] for engine, own in self.measured.items()}
         self.changes: dict[str, list[Change]] = {engine: findings.changes(engine, own) for engine, own in self.measured.items()}

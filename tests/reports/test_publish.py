@@ -2,6 +2,7 @@
 
 import json
 import re
+from datetime import date
 from html.parser import HTMLParser
 
 import pytest
@@ -95,6 +96,14 @@ def test_index_has_the_digits_of_the_newest_releases(site):
 def test_index_counts_releases_with_results_and_tells_results_from_scenes_that_were_declined_before(site):
     text = Page(site / "index.html").text
     assert "mujoco : 3 of 4 releases have results; results changed in 3.11.0; which scenes have results changed in 3.10.0 ( badge" in text
+
+
+def test_page_of_an_engine_counts_the_results_of_others_that_are_the_same(site):
+    """Of eight, the four with default settings differ, and one of the others was declined here."""
+    text = Page(site / "engine-mujoco.html").text
+    machine = f"another {HOSTILE}"
+    assert f"the same 3.9.0 {date.today()} {machine}" in text
+    assert "mujoco 3.9.0 2 of 8 results" in text
 
 
 def test_badges_are_those_of_shields_io(site):

@@ -36,4 +36,8 @@ def write_record(folder):
         found = [row for label in ("mujoco", "mujoco[profile=default]") for row in rows(label, value, declined)]
         record.write("mujoco", release, found, common | {"versions": f"mujoco {release}, numpy 2.0.0"})
     record.write("mujoco", "3.10.1", [{"verdict": "missing", "reason": f"not installable: {HOSTILE}"}], common)
+    sent = Record(f"{folder}-sent")
+    found = [*rows("mujoco", 12.7), *rows("mujoco[profile=default]", 1.0)]
+    sent.write("mujoco", "3.9.0", found, common | {"processor": f"another {HOSTILE}", "versions": "mujoco 3.9.0"})
+    record.merge([f"{folder}-sent"])
     record.write("pybullet", "3.2.7", list(rows("pybullet", 0.0)), common | {"versions": "pybullet 3.2.7"})

@@ -1,4 +1,4 @@
-"""The record of releases: measured once, resumed, and refused if changed. pip and npm are replaced: no test needs a network.
+"""The record of releases: measured once, resumed, merged, and refused if changed. pip and npm are replaced: no test needs a network.
 
 The file is longer than 300 lines because it tests every way in which a release, a file or an index can fail.
 """
@@ -20,7 +20,7 @@ from dropspin.comparisons.engines.registry import BUILT_IN
 from dropspin.comparisons.record import environments, release, study
 from dropspin.comparisons.record.environments import measured, without_paths
 from dropspin.comparisons.record.plan import Plan, load_plan
-from dropspin.comparisons.record.store import HASH, SCHEMA, Record, machine, stored
+from dropspin.comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, machine, stored
 from dropspin.comparisons.results.folder import sha256
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.running.timing import TimedSteps
@@ -120,11 +120,60 @@ def test_a_release_that_fails_costs_its_own_row(stub, tmp_path):
     assert table(tmp_path)["verdict"].tolist() == ["measured", "broken", "measured"]
 
 
+def test_workers_of_a_cluster_measure_with_their_own_machine_in_the_rows(stub, tmp_path, monkeypatch):
+    """Workers are threads of this process, with the stub in place of pip; the record is the one of this machine."""
+    distributed = pytest.importorskip("distributed")
+    record(tmp_path / "here", chosen=["1.0", "1.1"])
+    monkeypatch.setattr(study, "machine", lambda: machine() | {"processor": "of the worker"})
+    there = tmp_path / "there"
+    with distributed.LocalCluster(1, threads_per_worker=2, processes=False, protocol="tcp", dashboard_address=None) as cluster:
+        record(there, scheduler=cluster.scheduler_address)
+        assert sorted(stub.asked) == sorted(["1.0", "1.1", *RELEASES])
+        record(there, scheduler=cluster.scheduler_address)
+    assert len(stub.asked) == 5  # what the workers have measured is not measured again
+    rows = table(there)
+    assert set(rows["processor"]) == {"of the worker"}
+    columns = ["release", "value", "label", "scene", "versions"]
+    assert rows.iloc[:2][columns].equals(table(tmp_path / "here")[columns])
+
+
 def rewrite(path, **changes):
     """Change a file of one row."""
     row = pq.ParquetFile(path).read().to_pylist()[0] | changes
     types = pa.schema([(field.name, pa.string() if isinstance(row[field.name], str) else field.type) for field in SCHEMA])
     pq.write_table(pa.Table.from_pylist([row], types), path)
+
+
+@pytest.fixture
+def two_records(stub, tmp_path, monkeypatch):
+    """Of two machines."""
+    mine, sent = tmp_path / "mine", tmp_path / "sent"
+    record(mine)
+    monkeypatch.setattr(study, "machine", lambda: machine() | {"processor": "another"})
+    record(sent, chosen=["1.0", "1.2"])
+    return mine, sent
+
+
+def test_merging_loses_nothing_and_merging_twice_changes_nothing(two_records):
+    mine, sent = two_records
+    expected = sorted([*table(mine).drop(columns="origin").to_numpy().tolist(), *table(sent).drop(columns="origin").to_numpy().tolist()])
+    assert dropspin("record", "--merge", sent, "-o", mine, cwd=mine).stdout == f"2 files added to {mine}, as unsigned\n"
+    after = files(mine)
+    rows = table(mine)
+    assert sorted(rows.drop(columns="origin").to_numpy().tolist()) == expected
+    assert rows["origin"].tolist() == ["own", "unsigned", "own", "own", "unsigned"]
+    assert Record(mine).merge([str(sent), *map(str, sent.rglob("*.parquet"))]) == []
+    assert Record(sent).merge([str(mine)]) == sorted(path.name for path in (mine / OWN).iterdir())
+    assert files(mine) == after
+
+
+def test_a_changed_digit_is_refused_with_the_name_of_the_file(two_records):
+    mine, sent = two_records
+    path = max(sent.rglob("*.parquet"))
+    rewrite(path, value=1.2 + 4e-16)
+    before = files(mine)
+    assert_refused(dropspin("record", "--merge", sent, "-o", mine, cwd=mine), f"{path.name}: refused: it was changed")
+    assert files(mine) == before
 
 
 @pytest.mark.parametrize(
@@ -143,21 +192,21 @@ def rewrite(path, **changes):
         ("measured", "yesterday", "isoformat"),
     ],
 )
-def test_rows_that_no_record_has_are_refused(stub, tmp_path, column, value, words):
+def test_rows_that_no_record_has_are_refused(two_records, column, value, words):
     """With the right hash in the name: whoever writes a file can compute it."""
-    record(tmp_path, chosen=["1.2"])
-    [path] = tmp_path.rglob("*.parquet")
+    mine, sent = two_records
+    path = max(sent.rglob("*.parquet"))
     rewrite(path, **{column: value})
     path = path.rename(path.with_name(f"wang-1.2-{sha256(path.read_bytes())[:HASH]}.parquet"))
     with pytest.raises(DropspinError, match=f"{re.escape(path.name)}: refused: .*{words}"):
-        stored(path)
+        Record(mine).merge([str(path)])
+    assert not (mine / OTHERS).exists()
 
 
-def test_a_changed_digit_is_refused_with_the_name_of_the_file(stub, tmp_path):
-    record(tmp_path, chosen=["1.2"])
-    [path] = tmp_path.rglob("*.parquet")
-    rewrite(path, value=1.2 + 4e-16)
-    assert_refused(dropspin("record", "publish", tmp_path, cwd=tmp_path), f"{path.name}: refused: it was changed")
+@pytest.mark.parametrize(("name", "words"), [("results.parquet", "its name is not"), ("absent", "no file of a record")])
+def test_what_is_no_record_is_refused(tmp_path, name, words):
+    (tmp_path / "results.parquet").touch()
+    assert_refused(dropspin("record", "--merge", name, cwd=tmp_path), words)
 
 
 def test_unknown_engines_and_releases_are_refused(stub, tmp_path):
@@ -271,10 +320,9 @@ def test_the_plan_names_engines_with_canonical_labels():
     assert len({plan.digest(name) for name in plan.engines}) == len(plan.engines)  # each loads its scenes
 
 
-def test_a_file_with_any_changed_byte_is_refused_or_read(stub, tmp_path):
+def test_a_file_with_any_changed_byte_is_refused_or_read(two_records):
     """With the right hash in the name, so that the reader of Parquet gets it."""
-    record(tmp_path, chosen=["1.2"])
-    [path] = tmp_path.rglob("*.parquet")
+    path = max(two_records[1].rglob("*.parquet"))
     content, refused = path.read_bytes(), []
     for place in range(0, len(content), max(1, len(content) // 100)):
         changed = bytearray(content)

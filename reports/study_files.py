@@ -1,11 +1,11 @@
 """The files that a study writes: tables as CSV and JSON, a Markdown page, pictures, and `section.json`, from which a report reads it."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import BaseModel, Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from dropspin.comparisons.regressions.comparing import History
 from dropspin.comparisons.results.folder import SECTION, file_name, read_stored
@@ -18,6 +18,9 @@ from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.stories.history import document as history_document
 from dropspin.reports.stories.study import Study
 from dropspin.scenarios import DropspinError, Scenario
+
+TOSSES = "tosses.json"
+"""The file with the tosses of the scenes beside it."""
 
 
 def write_study(study: Study, folder: Path) -> Document:
@@ -40,19 +43,23 @@ def write_study_and_page(study: Study, folder: Path) -> Document:
     return document
 
 
-def write_scenes(scenes: Iterable[Scenario], folder: Path) -> None:
-    """Write scenes as TOML files, each by its name, into a new folder."""
+def write_scenes(scene: Scenario, folder: Path) -> None:
+    """Write the scene of all tosses of a recording and that of each toss as TOML files, with the tosses as JSON, into a new folder."""
+    assert scene.recording is not None
     folder.mkdir()
-    for scene in scenes:
-        write_toml(scene, folder / f"{file_name(scene.name)}.toml", leave_out={"name", "summary", "source", "tags", "expect"})
+    (folder / TOSSES).write_text(scene.recording.model_dump_json(), encoding="utf-8")
+    values = scene.model_dump(mode="json", exclude_none=True, include={"body", "gravity", "floor"})
+    write_toml({"duration": scene.duration, **values, "recording": {"file": TOSSES}}, folder / "tosses.toml")
+    for toss in scene.recording.tosses:
+        content = values | {"recording": {"file": TOSSES, "toss": toss.name}}
+        write_toml(content, folder / f"{file_name(f'toss-{toss.name}')}.toml")
 
 
-def write_toml(model: BaseModel, file: Path, leave_out: set[str] | None = None) -> None:
+def write_toml(content: Mapping[str, Any], file: Path) -> None:
     """Write a scene or a header as TOML."""
     import tomlkit
 
-    values = model.model_dump(mode="json", exclude_none=True, exclude=leave_out)
-    file.write_text(tomlkit.dumps(values), encoding="utf-8")
+    file.write_text(tomlkit.dumps(content), encoding="utf-8")
 
 
 def write_history(history: History, folder: Path) -> Document:

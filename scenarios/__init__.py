@@ -9,6 +9,7 @@ from dropspin.scenarios.loading import names as names
 from dropspin.scenarios.model import Scenario as Scenario
 from dropspin.scenarios.trajectory import Trajectory as Trajectory
 from dropspin.scenarios.truths import Truth as Truth
+from dropspin.scenarios.truths import reference_for as reference_for
 from dropspin.scenarios.truths import truth_for as truth_for
 from dropspin.scenarios.truths.discrete_flight import discrete_flight as discrete_flight
 

@@ -17,6 +17,7 @@ from dropspin.scenarios.errors import DropspinError, SceneError, SceneWarning, d
 from dropspin.scenarios.files import read_file
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.problems import scene_name
+from dropspin.scenarios.recording import with_recording
 from dropspin.scenarios.tables import LARGEST
 from dropspin.scenarios.validation import Alternatives, first_problem, shown
 
@@ -57,7 +58,7 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         SceneError: The scene is not valid. The message gives the file or mapping, the key, the value and the allowed values.
     """
     if isinstance(scene, Mapping):
-        return _plausible(from_mapping(with_mesh(dict(scene), Path())), "scene")
+        return _plausible(from_mapping(_with_files(dict(scene), Path())), "scene")
     if not isinstance(scene, str | Path):
         raise SceneError(f"scene: got {shown(scene)} ({type(scene).__name__}); give a catalogue name, a path or a mapping.")
     if isinstance(scene, str) and (drawn := re.fullmatch(DRAWN, scene)):
@@ -71,8 +72,13 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         str(path).encode()
     except UnicodeEncodeError:
         raise SceneError(f"{str(path)!a}: the file's name is not UTF-8 text; rename it.") from None
-    loaded = from_table(path.stem, str(scene), with_mesh(read_toml(path, str(scene)), path.parent))
+    loaded = from_table(path.stem, str(scene), _with_files(read_toml(path, str(scene)), path.parent))
     return loaded if path.parent == CATALOGUE else _plausible(loaded, str(scene))
+
+
+def _with_files(content: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """The content of a scene's file with that of the files that it names."""
+    return with_recording(with_mesh(content, folder), folder)
 
 
 def with_mesh(content: dict[str, Any], folder: Path) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.bodies.surface import depth_below_centre
 from dropspin.scenarios.damping import Damping
+from dropspin.scenarios.recording import Recording, start_of
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, PARTS, Array
 from dropspin.scenarios.surfaces import Floor, Surface, Wall
@@ -109,6 +110,7 @@ class Scenario(Table):
         wall: The other planes, each with a point, a normal, restitution, friction and rest speed, or None; only beside a floor.
         damping: Decay rates [1/s], or factors of a step, or None.
         ensemble: The distribution of the initial states of an ensemble, or None.
+        recording: The measured tosses with which motions are compared, or None.
         expect: Bounds on metrics, each with a reason.
     """
 
@@ -125,6 +127,7 @@ class Scenario(Table):
     wall: tuple[Wall, ...] | None = None
     damping: Damping | None = None
     ensemble: Ensemble | None = None
+    recording: Recording | None = None
     expect: tuple[Expectation, ...] = ()
 
     # Validators rather than the types `Text` and `Prose`, whose functions the signature would show.
@@ -167,6 +170,16 @@ class Scenario(Table):
                 raise ValueError(
                     f"start.position: got {start}; there the body is {text}; move it along the wall's normal {list(wall.normal)}"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _starts_as_recorded(self) -> Self:
+        if self.recording is None:
+            return self
+        if self.ensemble is not None:
+            raise ValueError("ensemble: a recording has starts of its own; leave out [ensemble], or [recording]")
+        if self.start != Start(**start_of(self.recording)):
+            raise ValueError("start: must be that of the recording's first toss")
         return self
 
     @property
@@ -237,10 +250,12 @@ class Scenario(Table):
     def digest(self) -> str:
         """A short hash of everything that affects the motion: without texts, expectations and values that are the default."""
         texts: dict[str, Any] = dict.fromkeys(("name", "summary", "source", "tags", "expect"), True)
-        physics = self.model_dump_json(exclude=texts | {"body": set(self.body.arrays)}, exclude_defaults=True)
+        physics = self.model_dump_json(exclude=texts | {"body": set(self.body.arrays), "recording": True}, exclude_defaults=True)
         found = hashlib.sha256(physics.encode())
         for name in self.body.arrays:
             found.update(getattr(self.body, name).tobytes())
+        if self.recording is not None:
+            found.update(self.recording.digest.encode())
         return found.hexdigest()[:12]
 
     @property
@@ -255,10 +270,10 @@ class Scenario(Table):
         return math.floor(self.duration / dt + 1e-9)
 
     def starting_at(self, state: Array) -> "Scenario":
-        """The same scene with another initial state, shape (13,)."""
+        """The same scene with another initial state, shape (13,), and without a recording."""
         values = [float(value) for value in state]
         start = Start(**{name: tuple(values[part]) for name, part in PARTS.items()})
-        return self.model_copy(update={"start": start})
+        return self.model_copy(update={"start": start, "recording": None})
 
 
 def differ_in_start_alone(scenes: Sequence[Scenario]) -> bool:

@@ -32,8 +32,8 @@ REFLECTED = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0,
 
 
 def changed(scene: Scenario, duration: float | None = None, **tables: Tables) -> Scenario:
-    """The scene with some keys of some tables, the walls, or its duration replaced, and without expectations and ensemble."""
-    content = scene.model_dump(exclude={"expect", "ensemble"}, exclude_none=True)
+    """The scene with some keys of some tables, the walls, or its duration replaced, and without expectations, ensemble and recording."""
+    content = scene.model_dump(exclude={"expect", "ensemble", "recording"}, exclude_none=True)
     for table, keys in tables.items():
         content[table] = {**content[table], **keys} if isinstance(keys, Mapping) else keys
     return from_mapping({**content, "duration": scene.duration if duration is None else duration})

@@ -28,7 +28,7 @@ def judge_agreement(
     basis: Basis = "same_method" if shared else ""
     reason = f"no evidence: both are {shared}" if shared else ""
     # Without an exact solution, the motion of an engine takes its place, to determine which metrics apply.
-    known = truth or Truth("engine", "", lambda t: second[0].motion.states[: len(t)])
+    known = truth if truth is not None and truth.is_exact else Truth("engine", "", lambda t: second[0].motion.states[: len(t)])
     for metric in METRICS.values():
         if not (metric.agreement and metric.applies(scene, known)):
             continue

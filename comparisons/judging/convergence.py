@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.judging.error_budget import ErrorBudget, error_budget, is_sufficient, vector_budget
+from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY
 from dropspin.comparisons.measuring.comparison import Unresolved
 from dropspin.comparisons.measuring.metric import Average, Metric
 from dropspin.comparisons.measuring.tolerances import negligible, rounding
@@ -117,6 +118,24 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     return Convergence(found, float(np.min(dts)), order_tolerance, is_open, remark)
 
 
+def beside_recording(found: Convergence, uncertainty: float) -> Convergence:
+    """The convergence of the difference from a recording, which leaves an uncertainty: what remains as dt → 0 is not the engine's alone.
+
+    Its interval is widened by the uncertainty. A difference that is not larger is no error; of a larger one, the recording does not tell
+    what is due to the model, to the settings and to the start. It has no order.
+    """
+    budget = found.budget
+    lower, upper = max(budget.lower - uncertainty, 0.0), budget.upper + uncertainty
+    cause, reason = "unresolved", f"finer time steps are needed to tell it from the uncertainty of the recording, {uncertainty:.2g}"
+    if lower > 0.0:
+        cause, reason = COMBINED, f"remains as dt → 0; the uncertainty of the recording is {uncertainty:.2g}"
+    elif budget.asymptotic_error <= uncertainty:
+        cause, reason = WITHIN_UNCERTAINTY, f"within the uncertainty of the recording, {uncertainty:.2g}"
+    elif math.isnan(budget.asymptotic_error) or budget.cause == "unresolved":
+        reason = budget.reason
+    return replace(found, budget=ErrorBudget(cause, reason, budget.asymptotic_error, lower, upper))
+
+
 def _corrected(length: ErrorBudget, vector: ErrorBudget, finest: float) -> ErrorBudget:
     """The error budget of a length, corrected by that of its components; `finest` is the error at the finest time step."""
     if vector.cause == "model" and length.cause in ("discretisation", "unresolved"):
@@ -145,7 +164,7 @@ def _worst_part(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     rounded = rounding(scene, metric.unit, claim.precision, steps)
     if metric.unit == "rad":
         errors[np.abs(errors) > SATURATION] = math.nan
-    if metric.name == "position_error" and scene.starts_above_floor:
+    if metric.name == "position_error" and scene.starts_above_floor and scene.recording is None:
         errors[np.abs(errors) > DESYNCHRONISED * scene.clearance] = math.nan
     return dts, errors, resolutions, rounded
 

@@ -13,7 +13,7 @@ from dropspin.comparisons.engines.base import EngineBroken, EngineMissing
 from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.engines.registry import BUILT_IN, engine
 from dropspin.comparisons.judging.convergence import JUMPING, Claim, Convergence, SeriesPoint
-from dropspin.comparisons.judging.verdicts import Basis, Judgement, Verdict
+from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY, Basis, Judgement, Verdict
 from dropspin.comparisons.measuring.comparison import BeyondHorizon
 from dropspin.comparisons.measuring.metric import Metric
 from dropspin.comparisons.measuring.metrics import METRICS
@@ -34,7 +34,8 @@ def judge(
         1. expectations     passed, failed, or known for a known fault; measured without an expectation
         2. undefined        a value that is not a number fails, unless the time step or the exact solution does not resolve it; without an
                             exact solution that is long enough, measured becomes no_truth
-        3. few starts       passed, failed and known become measured if the sampling noise of a quick run may decide between them
+        3. few starts       passed, failed and known become measured if the sampling noise of a quick run, or the uncertainty of a
+                            recording, may decide between them
         4. limitations      failed becomes limited if a known limitation that the engine met explains an error of this size
         5. precision        failed becomes limited if rounding in single precision may cause the distance from the bound
         6. model error      passed becomes known if the bounds exclude 0 and the asymptotic error is a known fault
@@ -63,8 +64,9 @@ def judge(
         near = [bound for bound in (lower, upper) if abs(bound - value) <= point.noise]
         values = (value - point.noise, value + point.noise, *near)
         if {compared_with_expectations(scene, claim.label, point.dt, metric, other).verdict for other in values} - {verdict}:
-            verdict, basis = "measured", "few_starts"
-            reason = f"not decided by the few starts of a quick run (± {point.noise:.2g}): {reason}"
+            verdict, basis = "measured", "few_starts" if truth is None or truth.is_exact else "uncertain_recording"
+            of_what = "the few starts of a quick run" if basis == "few_starts" else "the recording"
+            reason = f"not decided by {of_what} (± {point.noise:.2g}): {reason}"
     if verdict == "failed" and (explained := _explained(claim, metric, abs(value))):
         verdict, reason = "limited", joined(*explained, reason)
     if verdict == "failed" and np.fmax(lower - value, value - upper) <= point.rounded:
@@ -78,7 +80,7 @@ def judge(
 
 
 def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, found: Convergence) -> Judgement | None:
-    """Judge an asymptotic error; None if the time steps give none.
+    """Judge an asymptotic error; None if the time steps give none. The difference from a recording that remains is `measured`.
 
     A model error or a setting error is `known` if an expectation for this engine at its finest time step allows values of its interval,
     `limited` if a known limitation explains an error as small as the nearer end of the interval, and fails otherwise. An unresolved one is
@@ -89,7 +91,9 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, found:
         return None
     verdict: Verdict = "measured" if budget.cause == "unresolved" else "passed"
     reason = budget.reason
-    if budget.cause in ("model", "setting"):
+    if budget.cause in (WITHIN_UNCERTAINTY, COMBINED):
+        verdict = "measured"
+    elif budget.cause in ("model", "setting"):
         of_engine = [one for one in _matching(scene, claim.label, found.finest, metric) if one.engine is not None]
         allowing = _narrowest(of_engine)
         bounds = [_bounds(one, metric) for one in allowing]
@@ -124,7 +128,7 @@ def remark_on_horizon(scene: Scenario, truth: Truth | None, metric: Metric) -> s
 
     A metric of the first impact is not limited, because the exact solution contains this impact.
     """
-    if truth is None or metric.kind != "truth" or metric.first_flight or truth.covers_all(scene.duration):
+    if truth is None or not truth.is_exact or metric.kind != "truth" or metric.first_flight or truth.covers_all(scene.duration):
         return ""
     return f"compared up to t = {truth.horizon:.3g} s, where the exact solution ends: {truth.ends}"
 

@@ -15,13 +15,15 @@ MARKS: dict[str, str] = dict(zip(VERDICTS, "✗✗⏱∞✗?–†!·✓·", str
 """Verdicts as one character."""
 FAILURES = frozenset({"failed"})
 BREAKDOWNS = frozenset({"broken", "diverged", "crashed", "timed_out"})
-Basis = Literal["", "fault_absent", "few_starts", "same_method", "accepted_failure", "scene_changed"]
+Basis = Literal["", "fault_absent", "few_starts", "uncertain_recording", "same_method", "accepted_failure", "scene_changed"]
 """What a verdict is based on, beside value and bounds: the known fault that is expected does not occur; the few starts of a quick run do
-not decide it; two engines agree because they use the same discretisation; a failure was accepted; the scene is not the accepted one."""
+not decide it, or the uncertainty of the recording does not; two engines agree because they use the same discretisation; a failure was
+accepted; the scene is not the accepted one."""
+WITHIN_UNCERTAINTY, COMBINED = "within uncertainty", "model, setting or start"
+"""Causes of a difference from a recording: the recording does not tell it from 0; what contributes to it is not known."""
 Cause = str
-"""The cause to which an error is attributed: discretisation, model, setting, rounding, chaotic, unresolved, or an option of the engine that
-sets its
-accuracy; empty if the error was not attributed."""
+"""The cause to which an error is attributed: discretisation, model, setting, rounding, chaotic, unresolved, an option of the engine that
+sets its accuracy, or one of those of a difference from a recording; empty if the error was not attributed."""
 
 
 @dataclass(frozen=True)

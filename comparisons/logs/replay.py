@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TypeVar
 
 import numpy as np
@@ -19,15 +19,22 @@ from dropspin.comparisons.running.recording import Breakdown, record_batch, veri
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.loading import from_mapping
 from dropspin.scenarios.model import TOUCHING
+from dropspin.scenarios.recording import STARTS, Recording, start_of
 from dropspin.scenarios.rotations import cross, length, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, SPIN, Array
 from dropspin.scenarios.text import counted
 from dropspin.scenarios.truths.flight import flight_states
+from dropspin.scenarios.validation import validated
 from dropspin.scenarios.variations import whole_steps
 
 Result = TypeVar("Result")
 STEPS_PER_FRAME = 4
 """Time steps of an engine between two frames: at 148 Hz, 1.69 ms."""
+SEED = 48
+LONG = 2.0
+"""Times the duration of the median toss, after which a toss is not compared."""
+FRAME_DIGITS, START_DIGITS = 6, 9
+"""After the point, of the numbers of a scene of tosses: a µm, a µs; and so few nm that no start gets below the floor."""
 WHOLE = 1e-6
 """Steps by which a number of steps may miss a whole one."""
 BATCH_ROWS = 20_000
@@ -67,20 +74,35 @@ def scene_of(header: Header) -> Scenario:
     )
 
 
-def scenes_of(flights: Flights) -> list[Scenario]:
-    """The scene of each toss that has frames after its flight, from the end of the flight to the end of the record.
+def measured_scene(flights: Flights) -> Scenario | None:
+    """The scene of the tosses of a recording that have frames after their flights, each from the end of its flight on; None without one.
+
+    It lasts for at most twice the median toss, because engines simulate all tosses equally long.
 
     Raises:
         DropspinError: The header has no floor, or a body is below it during all of its flight.
     """
-    scene, found = scene_of(flights.log.header), []
+    header, random = flights.log.header, np.random.default_rng(SEED)
+    scene, found = scene_of(header), []
     for start in flights.starts():
-        if start.frame + 1 < len(start.toss):
-            dt = time_step([start])
-            launched = launches(scene, [start], start.state[np.newaxis], dt)
-            named = {"name": f"toss-{start.toss.name}", "duration": float(launched.frames[0, -1])}
-            found.append(scene.model_copy(update=named).starting_at(launched.states[0]))
-    return found
+        if start.frame + 1 == len(start.toss):
+            continue
+        dt = time_step([start])
+        states, earlier = _above_floor(scene, start, np.vstack([start.state, start.drawn(random, STARTS - 1)]), dt)
+        orientation = start.toss.orientation[start.frame + 1 :]
+        position = start.toss.position[start.frame + 1 :] - rotate(orientation, tracked_from_centre(header))
+        t = start.toss.t[start.frame + 1 :] - start.toss.t[start.frame] + earlier
+        frames = {"t": t, "position": position, "orientation": orientation}
+        rounded = {key: values.round(FRAME_DIGITS) for key, values in frames.items()}
+        found.append({"name": start.toss.name, **rounded, "starts": states.round(START_DIGITS)})
+    if not found:
+        return None
+    noise = {"position": flights.moving.noise.white, "orientation": flights.turning.noise.white}
+    name = PurePath(flights.log.origin).stem
+    recording = validated(Recording, flights.log.origin, {"name": name, "noise": noise, "tosses": found})
+    duration = min(recording.duration, round(LONG * float(np.median([toss["t"][-1] for toss in found])), 2))
+    content = scene.model_dump(include={"body", "gravity", "floor"}, exclude_none=True)
+    return from_mapping({**content, "name": name, "duration": duration, "recording": recording, "start": start_of(recording)})
 
 
 def flights_in(recording: Flights | Log | str | Path) -> Flights:
@@ -121,19 +143,26 @@ def launches(scene: Scenario, starts: Sequence[Start], states: Array, dt: float,
     Raises:
         DropspinError: The body is below the floor during all of a flight.
     """
-    found, frames, sunk = states.copy(), [], TOUCHING * scene.body.size
+    found, frames = states.copy(), []
     for row, start in enumerate(starts):
-        t, steps = start.toss.t, 0
-        while (depth := -scene.starting_at(found[row]).clearance) > sunk:
-            steps += 1
-            if steps * dt > t[start.frame] - t[start.first]:
-                raise DropspinError(
-                    f"toss {start.toss.name}: the body is {1e3 * depth:.3g} mm below the floor during its flight; "
-                    "correct floor_height, up, tracked_point or the size of the body."
-                )
-            [found[row]] = flight_states(states[row], scene.body.inertia_tensor, scene.acceleration)(np.array([-steps * dt]))
-        frames.append(_from(start, t, most) - t[start.frame] + steps * dt)
+        found[row : row + 1], earlier = _above_floor(scene, start, states[row : row + 1], dt)
+        frames.append(_from(start, start.toss.t, most) - start.toss.t[start.frame] + earlier)
     return Launches(found, _padded(frames))
+
+
+def _above_floor(scene: Scenario, start: Start, states: Array, dt: float) -> tuple[Array, float]:
+    """States at the end of a flight, or all by the same time earlier [s], a number of time steps, at which no body is below the floor."""
+    found, steps = states, 0
+    while (depth := -min(scene.starting_at(state).clearance for state in found)) > TOUCHING * scene.body.size:
+        steps += 1
+        if steps * dt > start.toss.t[start.frame] - start.toss.t[start.first]:
+            raise DropspinError(
+                f"toss {start.toss.name}: the body is {1e3 * depth:.3g} mm below the floor during its flight; "
+                "correct floor_height, up, tracked_point or the size of the body."
+            )
+        flown = [flight_states(state, scene.body.inertia_tensor, scene.acceleration) for state in states]
+        found = np.vstack([flight(np.array([-steps * dt])) for flight in flown])
+    return found, steps * dt
 
 
 def of_each_engine(

@@ -21,8 +21,8 @@ from dropspin.comparisons.measuring.states import States
 from dropspin.scenarios import Scenario, Trajectory, Truth
 from dropspin.scenarios.mechanics import apex
 from dropspin.scenarios.model import TOUCHING
-from dropspin.scenarios.rotations import cross
-from dropspin.scenarios.state import Array
+from dropspin.scenarios.rotations import cross, length
+from dropspin.scenarios.state import ORIENTATION, Array
 
 Rows = NDArray[np.intp]
 
@@ -43,6 +43,16 @@ class BeyondHorizon(Unresolved):
     """The exact solution ends too early for a comparison."""
 
 
+def at_times(motion: Trajectory, times: Array) -> Trajectory:
+    """A motion with equal steps at times [s] that need not be those of its rows, on the chords between these."""
+    steps = times / (motion.t[1] - motion.t[0])
+    before = np.minimum(steps.astype(np.intp), len(motion) - 2)
+    share, states = (steps - before)[:, np.newaxis], motion.states
+    found = (1.0 - share) * states[before] + share * states[before + 1]
+    found[:, ORIENTATION] /= length(found[:, ORIENTATION])[:, np.newaxis]
+    return Trajectory.from_states(times, found, motion.velocity_lag)
+
+
 def exactly(truth: Truth, times: Array) -> Trajectory:
     """The exact solution at those of the given times at which it is known."""
     return truth(times[truth.covers(times)])
@@ -57,18 +67,26 @@ class Comparison:
         motion: The engine's motion: at least two rows, equally spaced in time.
         reference: The exact solution or the motion of another engine, at the same times, up to its end; None if there is neither.
         impacts: Times of the exact impacts [s]; empty if they are not known.
+        measured: The measured motion in the frames of its recording; None if there is none. Only positions and orientations are compared
+            with it.
     """
 
     scene: Scenario
     motion: Trajectory
     reference: Trajectory | None = None
     impacts: tuple[float, ...] = ()
+    measured: Trajectory | None = None
 
     @classmethod
     def with_truth(cls, scene: Scenario, motion: Trajectory, truth: Truth | None, exact: Trajectory | None = None) -> "Comparison":
-        """Compare a motion with the exact solution, up to its end; `exact` is the result of `exactly` if it was already computed."""
+        """Compare a motion with the exact solution, up to its end; `exact` is the result of `exactly` if it was already computed.
+
+        A measured motion is compared in its frames.
+        """
         if truth is None:
             return cls(scene, motion)
+        if truth.frames is not None:
+            return cls(scene, motion, measured=truth(truth.frames[truth.frames <= motion.t[-1]]))
         return cls(scene, motion, exactly(truth, motion.t) if exact is None else exact, tuple(event.time for event in truth.events))
 
     @classmethod
@@ -86,6 +104,8 @@ class Comparison:
         Raises:
             BeyondHorizon: The reference ends after too few steps.
         """
+        if self.measured is not None:
+            return self.measured
         assert self.reference is not None
         if len(self.reference) < min(SHORTEST_FLIGHT, len(self.motion) - 1):
             raise BeyondHorizon(f"the exact solution is known for {len(self.reference) - 1} steps of {self.dt:g} s only")
@@ -94,6 +114,8 @@ class Comparison:
     @cached_property
     def compared(self) -> Trajectory:
         """The motion at the reference's times."""
+        if self.measured is not None:
+            return at_times(self.motion, self.measured.t)
         return self.motion[: len(self.exact)]
 
     @cached_property

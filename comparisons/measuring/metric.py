@@ -15,6 +15,8 @@ from dropspin.scenarios.state import Array
 
 Measure = Callable[[Comparison], float | Array]
 Components = Callable[[Comparison], Array]
+PHASES_OF_TOSS = 4
+"""Start phases of each toss of a recording, one for each quarter."""
 Applies = Callable[[Scenario, Truth | None], bool]
 
 
@@ -61,10 +63,14 @@ class Metric:
     def average_components(self, cases: Sequence[Comparison]) -> "Average | None":
         """The average of the components over start phases, parts of shape (flights, 3); None for a metric without components.
 
+        So is that of a measured motion.
+
         Raises:
             Unresolved: The time step is too coarse.
         """
-        return None if self.components is None else self._average(self.components, cases)
+        if self.components is None or cases[0].measured is not None:  # a recording does not say where its flights end
+            return None
+        return self._average(self.components, cases)
 
     @np.errstate(all="ignore")  # an engine may return 0 or 1e300; the inf or NaN that follows is judged as such
     def _average(self, measure: Measure, cases: Sequence[Comparison]) -> "Average":
@@ -79,7 +85,10 @@ class Metric:
         resolutions[later:] = phases[:, later:].std(axis=0)
         if len(cases) == 1 and any(impact > cases[0].dt for impact in cases[0].impacts[:1]):
             resolutions = np.abs(phases[0])  # of a single start, the whole value may depend on where in a step its first impact falls
-        return Average(phases.mean(axis=0), resolutions, np.ptp(phases, axis=0) / len(phases))
+        ranges = np.ptp(phases, axis=0)
+        if cases[0].measured is not None and len(cases) > 1:
+            ranges = np.ptp(phases.reshape(-1, PHASES_OF_TOSS, *phases.shape[1:]), axis=1).max(axis=0)
+        return Average(phases.mean(axis=0), resolutions, ranges / len(phases))
 
     def value_or_nan(self, cases: Sequence[Comparison]) -> float:
         """The value of the average; NaN if the time step is too coarse."""

@@ -7,14 +7,19 @@ from dropspin.scenarios.mechanics import kinetic_energy
 from dropspin.scenarios.state import RATES, SPIN, Array
 
 
+def has_reference(scene: Scenario, truth: Truth | None) -> bool:
+    """An exact solution, or a recording."""
+    return truth is not None
+
+
 def has_truth(scene: Scenario, truth: Truth | None) -> bool:
     """An exact solution."""
-    return truth is not None
+    return truth is not None and truth.is_exact
 
 
 def spins(scene: Scenario, truth: Truth | None) -> bool:
     """An exact solution with spin."""
-    if truth is None:
+    if truth is None or not truth.is_exact:
         return False
     sampled = truth(np.linspace(0.0, min(scene.duration, truth.horizon), 9))
     return bool(sampled.angular_velocity.any()) or any(event.after[SPIN].any() for event in truth.events)

@@ -58,10 +58,12 @@ class Causes(NamedTuple):
 def causes(results: Results, engine: str) -> Causes:
     """The causes each of which alone explains asymptotic errors of an engine and is excluded by none.
 
+    Those beside a recording may have other causes than an engine's.
     Each error must lie within its 95 % interval, widened by the error of sampling the exact solutions at the run's finest time step.
     """
     table = results.table
     mine = table[(table["engine"] == engine) & (table["kind"] == "asymptotic_error") & ~table["metric"].isin(JUMPING)]
+    mine = mine[~mine["scene"].isin(results.recorded)]
     judged = mine[mine["verdict"].isin(["failed", "passed"]) & (mine["cause"] != "unresolved") & mine["lower"].notna()]
     failed = judged[judged["verdict"] == "failed"]
     if failed.empty:

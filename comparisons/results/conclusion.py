@@ -79,7 +79,7 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     """The answers of a run, for each metric of `QUESTIONS` that it has and each engine that was tried in one of its scenes.
 
     An error is within the tolerance if its size plus its uncertainty, the column `tolerance`, is; it is beyond if its size minus that
-    uncertainty is. A time step at which the engine broke down is beyond.
+    uncertainty is. A time step at which the engine broke down is beyond. Scenes with a recording in place of an exact solution do not count.
 
     Args:
         results: The run.
@@ -89,7 +89,8 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     table = results.table
     is_broken = table["verdict"].isin(BREAKDOWNS)
     tried = table[table["dt"].notna() & (table["kind"].isin(["truth", "invariant"]) | is_broken)]
-    errors = table[(table["kind"] == "truth") & table["metric"].isin(QUESTIONS)]
+    is_exact = (table["kind"] == "truth") & ~table["scene"].isin(results.recorded)
+    errors = table[is_exact & table["metric"].isin(QUESTIONS)]
     sizes = np.array(relative_sizes(errors, results.scenes))
     uncertain = np.array(relative_sizes(errors.assign(value=errors["tolerance"].fillna(0.0)), results.scenes))
     states = np.select([sizes + uncertain <= within, sizes - uncertain > within], ["within", "beyond"], "undecided")

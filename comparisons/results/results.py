@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
+from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING, STUDIES
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, VERDICTS, WORDS
 from dropspin.comparisons.measuring.metrics import leading_metric
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.ensembles import EnsembleOutcome
 from dropspin.comparisons.results.provenance import digest
 from dropspin.comparisons.results.table import empty_table
-from dropspin.scenarios import Scenario, Trajectory, UnknownName, truth_for
+from dropspin.scenarios import Scenario, Trajectory, UnknownName, reference_for
 
 TrajectoryKey = tuple[str, str, float]
 FRAMES = ("table", "predictions", "agreements")
@@ -128,10 +128,13 @@ class Results:
         table, verdicts = self.table, self.table["verdict"]
         is_small = (verdicts == "known") & ~(table["value"].abs() > SMALLEST_STATED)
         explains_nothing = (verdicts == "limited") & (table["metric"] == "")
+        # Beside a recording, errors pass by expectations alone: no engine converges to it.
+        recorded = table["scene"].isin(self.recorded)
+        is_law = recorded & (verdicts == "passed") & table["kind"].isin(STUDIES)
         of_rows = {
-            "severity": verdicts.map(VERDICTS.index).where(~(is_small | explains_nothing)),
+            "severity": verdicts.map(VERDICTS.index).where(~(is_small | explains_nothing | is_law)),
             "of_model": (verdicts == "known") & (table["cause"] == "model"),
-            "studied": table["kind"] == "asymptotic_error",
+            "studied": (table["kind"] == "asymptotic_error") & ~recorded,
             "undecided": is_undecided(table) & ~table["metric"].isin(JUMPING),
         }
         by_pair = table[["scene", "engine"]].assign(**of_rows).groupby(["scene", "engine"])
@@ -153,14 +156,14 @@ class Results:
             scene: Name of the scene.
 
         Returns:
-            The columns of `table`, with the engine as index; empty if the scene has no exact solution or no engine has a motion.
+            The columns of `table`, with the engine as index; empty if the scene has no reference or no engine has a motion.
 
         Raises:
             UnknownName: The run has no such scene.
         """
         if scene not in self.scenes:
             raise UnknownName("scene", scene, self.scenes)
-        if truth_for(self.scenes[scene]) is None:
+        if reference_for(self.scenes[scene]) is None:
             return self.measurements.iloc[:0].set_index("engine")
         found = self.measurements
         mine = found[(found["scene"] == scene) & found["value"].notna()]
@@ -177,8 +180,13 @@ class Results:
         return str(findings["metric"].iloc[int(np.argmax(relative_sizes(findings, self.scenes)))])
 
     @property
+    def recorded(self) -> list[str]:
+        """The scenes that are compared with a recording."""
+        return [name for name, scene in self.scenes.items() if scene.recording is not None]
+
+    @property
     def measurements(self) -> pd.DataFrame:
-        """The rows that compare an engine with exact solutions and conservation laws, at one time step each."""
+        """The rows that compare an engine with exact solutions, recordings and conservation laws, at one time step each."""
         return self.table[self.table["kind"].isin(["truth", "invariant"])]
 
     def asymptotic_errors(self, *causes: str) -> pd.DataFrame:

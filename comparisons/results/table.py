@@ -27,6 +27,7 @@ Kind = Literal[
     "prediction",
     "other_law",
     "setting",
+    "uncertainty",
     "ensemble",
     "order",
     "asymptotic_error",
@@ -52,7 +53,7 @@ class Measurement:
         value: The value, in `unit`.
         unit: SI unit; '1' for a ratio.
         kind: What the value is compared with.
-        truth: Name of the exact solution; for an agreement the other engine's label; for `other_law` the impact law; for
+        truth: Name of the exact solution, or `measured`; for an agreement the other engine's label; for `other_law` the impact law; for
             `setting` the settings of which the value is the share of the error.
         lower: Least value allowed, or the lower end of the 95 % interval of an order or an asymptotic error; NaN where there is none.
         upper: Largest value allowed, or the upper end of that interval; NaN where there is none.
@@ -227,6 +228,6 @@ def _units(metric: str) -> Mapping[str, str]:
     if metric in ENSEMBLE_METRICS:
         return dict.fromkeys(("ensemble", "agreement"), ENSEMBLE_METRICS[metric].unit)
     if metric in METRICS:
-        kinds = METRICS[metric].kind, "prediction", "other_law", "agreement", "asymptotic_error"
+        kinds = METRICS[metric].kind, "prediction", "other_law", "uncertainty", "agreement", "asymptotic_error"
         return dict.fromkeys(kinds, METRICS[metric].unit) | {"order": "1", "setting": "1"}
     return {str(kind_of(metric)): "1"}

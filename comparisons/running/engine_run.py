@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dropspin.comparisons.engines.base import KnownLimitation
+from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.measuring.tolerances import perturbed
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, EnsembleOutcome
@@ -16,6 +17,7 @@ from dropspin.comparisons.running.ensembles import run_ensemble
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.progress import OnSimulations
 from dropspin.comparisons.running.recording import Breakdown, classify, record, record_batch, verify_accepted
+from dropspin.comparisons.running.uncertainty import simulations_of, uncertainties
 from dropspin.comparisons.running.verification import verified_claims, verified_predictions
 from dropspin.scenarios import Scenario, Trajectory, truth_for
 
@@ -37,6 +39,7 @@ class EngineRun:
         order: The order that it claims.
         precision: Of its state.
         predicted: Errors by metric that its scheme must have.
+        uncertainties: By metric, the largest value that the recording of the scene leaves an engine without an error.
     """
 
     label: str
@@ -51,6 +54,7 @@ class EngineRun:
     order: float | None = None
     precision: type = np.float64
     predicted: dict[str, float] = field(default_factory=dict)
+    uncertainties: dict[str, float] = field(default_factory=dict)
 
 
 def run_engine(
@@ -72,7 +76,9 @@ def run_engine(
         found.discretisation, found.order, found.precision = verified_claims(engine, scene)
         sets = [] if quick and found.precision is np.float64 else perturbed(scene, starts, found.precision)
         others = [*(starts if len(starts) > 1 else []), *chain(*sets)]
-        total = 1 + len(others)
+        size = 0 if scene.recording is None else len(starts) // PHASES_OF_TOSS
+        drawn = size and size * simulations_of(size)
+        total = 1 + len(others) + drawn
         own = record(engine, scene, dt)
         on_simulations(1, total)
         found.motion, found.limitations, found.settings = own.motion, own.limitations, own.settings
@@ -81,8 +87,10 @@ def run_engine(
         found.phases = [own.motion] if len(starts) == 1 else [next(motions) for _ in starts]
         found.perturbed = [[next(motions) for _ in moved] for moved in sets]
         found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt, QUICK_MEMBERS if quick else None)
+        if drawn:
+            found.uncertainties = uncertainties(engine, scene, dt, size, lambda done: on_simulations(total - drawn + done, total))
         # The predicted error of a bounce is a mean over start phases.
-        if scene.floor is None or len(starts) > 1:
+        elif scene.floor is None or len(starts) > 1:
             truth = truth_for(scene)
             predicted = {metric.name: engine.predicted_error(scene, truth, metric.name, dt) for metric in metrics_for(scene, truth)}
             found.predicted = verified_predictions(predicted)

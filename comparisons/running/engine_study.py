@@ -10,7 +10,15 @@ from functools import cached_property
 from typing import NamedTuple
 
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.judging.convergence import ADDED_STEPS, ARTEFACTS, Claim, Convergence, SeriesPoint, convergence
+from dropspin.comparisons.judging.convergence import (
+    ADDED_STEPS,
+    ARTEFACTS,
+    Claim,
+    Convergence,
+    SeriesPoint,
+    beside_recording,
+    convergence,
+)
 from dropspin.comparisons.judging.judge import judge, judge_asymptotic_error, judge_order
 from dropspin.comparisons.judging.verdicts import FAILURES, Judgement
 from dropspin.comparisons.measuring.comparison import Comparison
@@ -120,6 +128,9 @@ class EngineStudy:
                 metric = METRICS[name]
                 judgement = judge(scene, truth, _claim(run), metric, point, causes.get(name))
                 yield timed.measurement(metric.kind, name, metric.unit, judgement, truths[metric.kind])
+                if metric.kind == "truth" and name in run.uncertainties:
+                    uncertainty = Judgement(run.uncertainties[name], "measured")
+                    yield timed.measurement("uncertainty", name, metric.unit, uncertainty, truths[metric.kind])
             if truth is None:
                 yield timed.remark("no_truth", "no closed form is known for this scene")
         extrapolated = Case(scene.name, self.entry.label)
@@ -180,7 +191,8 @@ class EngineStudy:
     def cause(self, name: str) -> Convergence:
         """Decide the cause of the errors of a metric.
 
-        The rules apply in this order. Each may replace the result before it, and simulates only what it needs:
+        That of the difference from a recording is decided by `beside_recording`. Otherwise, these rules apply in this order. Each may
+        replace the result before it, and simulates only what it needs:
 
             1. requested    the error budget of the requested time steps: `convergence`
             2. coarser      if these leave the cause open, coarser steps are added. Their result counts if the cause was unresolved, or if
@@ -200,6 +212,10 @@ class EngineStudy:
         scene, engine, metric, series = self.own.scene, self.entry.adapter, METRICS[name], self.series[name]
         dts = [point.dt for point in series]
         found = convergence(scene, self.claim, metric, series)
+        if metric.kind == "truth" and self.own.truth is not None and not self.own.truth.is_exact:
+            finest = min((outcome for outcome in self.outcomes if name in outcome.points), key=lambda outcome: outcome.case.dt)
+            self.causes[name] = beside_recording(found, finest.run.uncertainties[name])
+            return self.causes[name]
         if found.is_open:
             longer = self._longer(metric, [factor * max(dts) for factor in ADDED_STEPS])
             if longer is not None and (found.budget.cause == "unresolved" or longer.budget.cause == "model"):

@@ -6,11 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS
 from dropspin.comparisons.measuring.tolerances import SETS_OF_STARTS, SIGNS
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.start_phases import StartPhase, number_of_phases
 from dropspin.comparisons.running.timing import Timing
+from dropspin.comparisons.running.uncertainty import simulations_of
 
 MEASURING = 1e-5
 """Time to record and measure a step [s], beyond that of the step; 2 to 24 µs with wang, mujoco and pybullet."""
@@ -75,5 +77,8 @@ def simulations(own: StartPhase, entry: EngineEntry, dt: float) -> int:
     sets = len(SIGNS) if phases == 1 else SETS_OF_STARTS if scene.floor is not None and not scene.starts_above_floor else 0
     if own.quick and entry.adapter.precision is np.float64:
         sets = 0
+    if scene.recording is not None:
+        tosses = phases // PHASES_OF_TOSS
+        return 1 + phases + tosses * simulations_of(tosses)
     members = 0 if scene.ensemble is None else min(scene.ensemble.size, QUICK_MEMBERS) if own.quick else scene.ensemble.size
     return 1 + (phases if phases > 1 else 0) + sets * phases + members

@@ -24,7 +24,7 @@ from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.running.scene_run import Timings, run_scene
 from dropspin.comparisons.running.start_phases import StartPhase
 from dropspin.comparisons.running.timing import Timing, time_engine
-from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
+from dropspin.scenarios import DropspinError, Scenario, Trajectory, reference_for, truth_for
 
 DEFAULT_DTS = (4e-3, 2e-3, 1e-3)
 
@@ -126,7 +126,7 @@ def _request(
         if not given:
             raise DropspinError(f"{name}: got none; give at least one.")
     labels = [entry.label for entry in entries]
-    requested = [StartPhase(scene, truth_for(scene), quick) for scene in chosen]
+    requested = [StartPhase(scene, reference_for(scene), quick) for scene in chosen]
     for scene, truth, *_ in requested:
         verify_expectations(scene, truth, labels)
         for step in dts:
@@ -182,6 +182,5 @@ def measure(scene: SceneLike, motion: Trajectory) -> dict[str, float]:
     scene = as_scene(scene)
     if not isinstance(motion, Trajectory):
         raise DropspinError(f"motion: got a {type(motion).__name__}; give a Trajectory, such as simulate() returns.")
-    truth = truth_for(scene)
-    verify_motion(scene, truth, motion)
-    return values_of(scene, truth, motion)
+    verify_motion(scene, truth_for(scene), motion)
+    return values_of(scene, reference_for(scene), motion)

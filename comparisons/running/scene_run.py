@@ -60,7 +60,7 @@ def run_scene(
         compared = [(study.outcomes[-1], of_study) for study, of_study in zip(studies, cases, strict=True) if of_study]
         for first, second in combinations(compared, 2):
             agreements += _agreement(own, first, second)
-        if dt == min(dts):
+        if dt == min(dts) and own.scene.recording is None:
             distances += _distances_to_other_laws(own.scene, dt, phases, compared)
     for study in studies:
         study.calibrated = next(filter(study.is_default_of, studies), None)

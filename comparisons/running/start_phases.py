@@ -1,5 +1,8 @@
 """Start phases, and every metric of the motions from them: the same drop from 32 starts averages out where in a time step it lands.
 
+A toss of a recording starts at the end of its flight. Its four phases are earlier states of this flight.
+
+
 An engine detects an impact at the first step that ends below the floor, so its error depends on the phase of the impact within a step.
 Starts that lie equal parts of a step further along the scene's motion draw that phase evenly (stratified sampling).
 """
@@ -12,14 +15,18 @@ import numpy as np
 from dropspin.comparisons.judging.convergence import JUMPING, SeriesPoint
 from dropspin.comparisons.measuring.batch import compute_cases, compute_states
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
-from dropspin.comparisons.measuring.metric import Average
+from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS, Average
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.measuring.states import States
 from dropspin.comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
 from dropspin.comparisons.running.engine_run import EngineRun
 from dropspin.scenarios import Scenario, Trajectory, Truth
+from dropspin.scenarios.state import Array
+from dropspin.scenarios.truths.flight import flight_states
+from dropspin.scenarios.truths.measured import tosses
 
 START_PHASES, QUICK_START_PHASES = 32, 8
+QUICK_TOSSES = 8
 MOST_ROWS = 400_000
 """Steps from all start phases together, unless a single start takes more: their motions and what is computed of them take a gigabyte."""
 REST_SHARE = 0.1
@@ -51,9 +58,12 @@ class StartPhase(NamedTuple):
 def number_of_phases(own: StartPhase, dt: float) -> int:
     """The number of start phases: 1 if no impact comes after the first step [s], or if all are over in a tenth of the duration.
 
-    Long scenes have fewer, so that they fit into memory.
+    Long scenes have fewer, so that they fit into memory. With a recording there are four of each toss.
     """
     scene, truth, quick, *_ = own
+    if truth is not None and not truth.is_exact and scene.recording is not None:
+        tosses = len(scene.recording.tosses)
+        return PHASES_OF_TOSS * (min(tosses, QUICK_TOSSES) if quick else tosses)
     if truth is None or not truth.events or truth.events[0].time <= dt or truth.events[-1].time < REST_SHARE * scene.duration:
         return 1
     return max(1, min(QUICK_START_PHASES if quick else START_PHASES, MOST_ROWS // scene.steps(dt)))
@@ -62,11 +72,23 @@ def number_of_phases(own: StartPhase, dt: float) -> int:
 def start_phases(scene: Scenario, truth: Truth | None, dt: float, *, quick: bool = False) -> list[StartPhase]:
     """The scene from starts that put its first impact at as many phases of a time step, or only the scene itself: `number_of_phases`."""
     count = number_of_phases(StartPhase(scene, truth, quick), dt)
+    if truth is not None and not truth.is_exact:
+        earlier = -(np.arange(PHASES_OF_TOSS) + 0.5) / PHASES_OF_TOSS * dt
+        return [phase for toss in tosses(scene)[: count // PHASES_OF_TOSS] for phase in _phases_of(*toss, earlier)]
     if truth is None or count == 1:
         return [StartPhase(scene, truth)]
     delays = (np.arange(count) + 0.5) / count * dt
     starts = zip(truth(delays).states, delays, strict=True)
     return [StartPhase(scene.starting_at(state), truth.after(delay), delay=delay) for state, delay in starts]
+
+
+def _phases_of(scene: Scenario, toss: Truth, delays: Array) -> list[StartPhase]:
+    """A toss from states of its flight that are later by some times [s]."""
+    flight = flight_states(scene.initial_state, scene.body.inertia_tensor, scene.acceleration)
+    return [
+        StartPhase(scene.starting_at(state), toss.after(delay), delay=delay)
+        for state, delay in zip(flight(delays), delays.tolist(), strict=True)
+    ]
 
 
 def phases_at(own: StartPhase, dt: float) -> Sequence[StartPhase]:
@@ -76,7 +98,7 @@ def phases_at(own: StartPhase, dt: float) -> Sequence[StartPhase]:
 
 def with_exact_motions(truth: Truth | None, phases: Sequence[StartPhase], dt: float) -> Sequence[StartPhase]:
     """Start phases with their exact motions at time steps of dt [s]: one call of the exact solution of the scene itself, if it is known."""
-    if truth is None:
+    if truth is None or not truth.is_exact:
         return phases
     times = dt * np.arange(1 + phases[0].scene.steps(dt), dtype=float)
     known = [times[phase.truth.covers(times)] for phase in phases if phase.truth is not None]
@@ -119,6 +141,7 @@ def measure(
             noise = np.inf if metric.name in JUMPING else average.noise
         moved = float(np.max([abs(metric.value_or_nan(some) - average.value) for some in perturbed], initial=0.0))
         sampling_noise = FEW_DRAWS * moved if len(cases) == 1 else average.jump + moved
+        noise = max(noise, run.uncertainties.get(metric.name, 0.0))
         allowed = tolerance(scene, metric.unit, precision, steps, sampling_noise)
         if precision is not np.float64:
             rounded = max(float(rounding(scene, metric.unit, precision, np.array(steps))), allowed)

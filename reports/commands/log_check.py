@@ -17,12 +17,13 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
     RECORDING is a header, a TOML file that names the body, the units and the file of data; or toss-cube, 100 measured tosses of a cube.
     Gravity, scale, drag, inertia and centre of mass are found from the flights alone, each with a 95 % interval, and wrong units, axes,
     orders and rates are named with the remedy; corrected.toml in the output folder is the header with the remedies of which the recording
-    leaves no doubt. If the header has a floor, scenes/ beside it has a scene of each toss, from the end of its flight on, for dropspin run.
+    leaves no doubt. If the header has a floor, scenes/ beside it has a scene of each toss and one of all, from the end of the flights on:
+    dropspin run compares engines with the tosses.
 
     Exit code: 0 no finding, 1 a finding, 2 bad input.
     """
     from dropspin.comparisons.logs.check import log_check
-    from dropspin.comparisons.logs.replay import scenes_of
+    from dropspin.comparisons.logs.replay import measured_scene
     from dropspin.comparisons.results.folder import study_folder
     from dropspin.reports.stories.log_check import CheckedLog
     from dropspin.reports.study_files import write_scenes, write_study_and_page, write_toml
@@ -32,8 +33,9 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
         check = log_check(recording)
         study = CheckedLog.of(recording, check)
         document = write_study_and_page(study, folder)
-        write_toml(check.corrected, folder / "corrected.toml")
-        if check.reads_the_columns_right and check.flights.log.header.floor is not None:
-            write_scenes(scenes_of(check.flights), folder / "scenes")
+        write_toml(check.corrected.model_dump(mode="json", exclude_none=True), folder / "corrected.toml")
+        can_continue = check.reads_the_columns_right and check.flights.log.header.floor is not None
+        if can_continue and (scene := measured_scene(check.flights)) is not None:
+            write_scenes(scene, folder / "scenes")
     print_json_or(json_output, study.rows(), document, os.path.join(output, "report.html"))
     return int(bool(study.findings))

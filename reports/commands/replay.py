@@ -21,7 +21,7 @@ from dropspin.reports.terminal.safe import echo
 def replay_command(
     run: str, scenes: tuple[str, ...], dt: float | None, output: str | None, gif: str | None, speed: float, opens: bool
 ) -> None:
-    """Show the motions of a run in 3D: engines overlaid or side by side, with the exact solution dashed.
+    """Show the motions of a run in 3D: engines overlaid or side by side, with the exact solution or recording dashed.
 
     On the page you can play the motions at any speed, go to any time, rotate the view, and see contacts and impulses. The page is one
     file and needs no network.

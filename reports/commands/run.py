@@ -59,7 +59,7 @@ def run_command(
     json_output: bool,
     **options: Any,
 ) -> int:
-    """Run scenes with several engines, compare them with exact solutions, and write the report.
+    """Run scenes with several engines, compare them with exact solutions or recordings, and write the report.
 
     SCENE is a name of the catalogue, the path of a TOML file, or core for the core catalogue. The default is the core catalogue
     with three engines at three time steps. With --draw, random scenes are generated, each with an exact solution; the name

@@ -30,7 +30,7 @@ from dropspin.reports.stories.impact_laws import NOTE
 from dropspin.reports.stories.matrix import leading_errors, legend_of_marks, step_times
 from dropspin.reports.stories.run import Overview
 from dropspin.reports.stories.scene import left_out, modelled
-from dropspin.scenarios import truth_for
+from dropspin.scenarios import reference_for
 from dropspin.scenarios.problems import identifier
 
 
@@ -52,6 +52,7 @@ def html_report(
         "report.html",
         **vars(summary),
         engines=results.engines,
+        references=_references(results),
         provenance=results.provenance,
         passed=summary.counts.failed == 0 and summary.counts.broken == 0,
         colours=engine_colours(results.engines),
@@ -72,15 +73,21 @@ def html_report(
     )
 
 
+def _references(results: Results) -> str:
+    """What the engines of a run are compared with."""
+    exact, recorded = len(results.recorded) < len(results.scenes), bool(results.recorded)
+    return " and ".join(["exact solutions"] * exact + ["recordings"] * recorded)
+
+
 def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]], has_failed: bool) -> dict[str, Any]:
     [(name, scene)] = results.scenes.items()
-    truth = truth_for(scene)
+    truth = reference_for(scene)
     frame, own, order = results.table, results.measurements, list(ENSEMBLE_METRICS)
     dts = sorted(frame["dt"].dropna().unique(), reverse=True)
     pairs = results.agreements[results.agreements["dt"] == min(dts)]
     finest = pd.concat([frame[frame["dt"] == min(dts)], pairs])
     ensemble = finest[finest["metric"].isin(order)]  # the means, followed by the differences between engines
-    studies = frame[frame["kind"].isin(STUDIES)]
+    studies, uncertain = frame[frame["kind"].isin(STUDIES)], frame[frame["kind"] == "uncertainty"]
     motions = replay_of(results, name)
     budgets = error_budgets(results, name)
     convergence = [line for chart in charts.get("convergence", ()) for line in chart.lines]
@@ -92,14 +99,15 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
         "scene": scene,
         "modelled": modelled(scene),
         "left_out": left_out(scene),
-        "truth": None if truth is None else truth.statement,
+        "truth": truth,
         "dts": dts,
         "metrics": list(own["metric"].unique()),
         "cells": {(row["metric"], row["engine"], row["dt"]): row for row in own.to_dict("records")},
+        "uncertainties": uncertain.set_index(["metric", "engine", "dt"])["value"].to_dict(),
         "trends": _trends(studies),
         "budgets": [budget for budget in budgets if budget["cause"] != "discretisation"],
         "converging": sum(budget["cause"] == "discretisation" for budget in budgets),
-        "rows": _all_results(results, name, pd.concat([own, studies, frame[frame["kind"].isin(OF_SYMMETRIES)]])),
+        "rows": _all_results(results, name, pd.concat([own, uncertain, studies, frame[frame["kind"].isin(OF_SYMMETRIES)]])),
         "replay": None if motions is None else as_data(motions),
         "remarks": frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).to_dict("records"),
         "agreement": pairs[~pairs["metric"].isin(order)].to_dict("records"),

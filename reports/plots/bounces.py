@@ -7,7 +7,6 @@ import numpy as np
 from dropspin.comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.chart import Chart, Line, draw
-from dropspin.reports.plots.colours import EXACT
 from dropspin.reports.plots.style import Array, at_one_step, step_of
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 from dropspin.scenarios.mechanics import apex
@@ -40,7 +39,7 @@ def bounce_ladder(results: Results, scene_name: str) -> Chart:
         lines.append(Line(x=np.arange(len(heights), dtype=float), y=heights, **style | {"width": 0.0}))
     shown = max([lasting, *(len(line.x) for line in lines)])
     stairs = exact[:shown] / exact[0]
-    lines.append(Line(EXACT, np.arange(len(stairs), dtype=float), stairs, width=1.0, dashes="dashed"))
+    lines.append(Line(truth.word, np.arange(len(stairs), dtype=float), stairs, width=1.0, dashes="dashed"))
     ticks = [(float(bounce), str(bounce)) for bounce in range(0, shown, 1 + shown // 8)]
     return Chart("bounce", "apex / drop height", lines, y_log=True, ticks=ticks)
 

@@ -1,4 +1,4 @@
-"""Labels and styles that all plots and tables share: a colour and a marker per engine, and the label of the exact solution."""
+"""Labels and styles that all plots and tables share: a colour and a marker per engine, by its label."""
 
 from collections.abc import Sequence
 from zlib import crc32
@@ -8,8 +8,6 @@ KNOWN = {"wang": ("#0072B2", "o"), "mujoco": ("#D55E00", "s"), "pybullet": ("#00
 COLOURS = ("#CC79A7", "#E69F00", "#56B4E9", "#8C8C8C", "#A6761D", "#7B5EA7", "#B33B24", "#3D8B8B")
 MARKERS = ("^", "v", "P", "X", "*")
 STYLES = [(colour, marker) for marker in MARKERS for colour in COLOURS]
-EXACT = "exact solution"
-"""Label of the exact solution in plots and replays."""
 
 
 def engine_styles(engines: Sequence[str]) -> dict[str, tuple[str, str]]:

@@ -15,7 +15,7 @@ from dropspin.reports.plots.limits import failure_modes
 from dropspin.reports.plots.over_time import over_time, quantities
 from dropspin.reports.plots.spins import polhode, wobbles_freely
 from dropspin.reports.plots.tradeoff import error_over_cost, throughput
-from dropspin.scenarios import truth_for
+from dropspin.scenarios import reference_for
 
 if TYPE_CHECKING:
     from dropspin.comparisons.tradeoff.points import TradeOff
@@ -59,7 +59,8 @@ def convergence_charts(results: Results, scene_name: str) -> list[Chart]:
 def flight_charts(results: Results, scene_name: str) -> list[Chart]:
     """The polhode of a body that does not spin about a principal axis, and errors over time; none for scenes with a floor."""
     scene = results.scenes[scene_name]
-    if scene.floor is not None or truth_for(scene) is None:
+    truth = reference_for(scene)
+    if scene.floor is not None or truth is None or not truth.is_exact:
         return []
     paths = [polhode(results, scene_name)] if wobbles_freely(scene) else []
     growing = _errors(results, scene_name, GROWTH, WORTH_A_LINE)[: MOST_PANELS - len(paths)]
@@ -69,7 +70,7 @@ def flight_charts(results: Results, scene_name: str) -> list[Chart]:
 def bounce_charts(results: Results, scene_name: str) -> list[Chart]:
     """The bounce ladder, and the position error over time; none if the exact solution is not a bounce ladder."""
     scene = results.scenes[scene_name]
-    truth = truth_for(scene)
+    truth = reference_for(scene)
     if truth is None or truth.name != "bounce-ladder" or not truth.events or not scene.starts_above_floor:
         return []
     return [bounce_ladder(results, scene_name), error_growth(results, scene_name, "position_error")]

@@ -1,4 +1,4 @@
-"""Quantities of a motion over time, for each engine and for the exact solution."""
+"""Quantities of a motion over time, for each engine and for the exact solution or the recording."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -7,9 +7,8 @@ import numpy as np
 
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.chart import FLAT, Chart, Line, draw
-from dropspin.reports.plots.colours import EXACT
 from dropspin.reports.plots.style import MOST_POINTS, TIME, Array, at_one_step, stride
-from dropspin.scenarios import Scenario, Trajectory, Truth, truth_for
+from dropspin.scenarios import Scenario, Trajectory, Truth, reference_for
 from dropspin.scenarios.mechanics import angular_momentum, energy
 from dropspin.scenarios.rotations import angle_between_orientations, rotate
 
@@ -60,7 +59,7 @@ def quantities(scene: Scenario) -> dict[str, Quantity]:
 
 @np.errstate(all="ignore")  # an engine may return 1e300
 def over_time(results: Results, scene_name: str, quantity: Quantity) -> Chart:
-    """A quantity over time: each engine at the coarsest time step, where engines differ most, and the exact solution.
+    """A quantity over time: each engine at the coarsest time step, where engines differ most, and the exact solution or the recording.
 
     A curve that oscillates too fast to be drawn is shown as an envelope: the smallest and the largest value around each point.
 
@@ -70,18 +69,20 @@ def over_time(results: Results, scene_name: str, quantity: Quantity) -> Chart:
         quantity: A function of a scene and a motion, shape (n,).
     """
     scene = results.scenes[scene_name]
-    truth = truth_for(scene)
+    truth = reference_for(scene)
     lines, times = [], np.linspace(0.0, scene.duration, MOST_POINTS)
     for motion, style in at_one_step(results, results.trajectories, scene_name, max):
         times = motion.t[:: stride(len(motion))]
         lines.append(_drawn(Line(x=motion.t, y=quantity(scene, motion), **style | {"marker": ""}), times))
     if truth is not None:
-        exact = _sampled(truth, times, min(scene.duration, truth.horizon))
-        lines.append(_drawn(Line(EXACT, exact.t, quantity(scene, exact), width=1.0, dashes="dashed"), times))
+        end = min(scene.duration, truth.horizon)
+        exact = _sampled(truth, times, end) if truth.frames is None else truth(truth.frames[truth.frames <= end])
+        line = Line(truth.word, exact.t, quantity(scene, exact), width=1.0, dashes="dashed")
+        lines.append(_drawn(line, times) if truth.is_exact else line)
     envelopes = any(line.is_fill for line in lines)
     remark = "The oscillation is too fast to be drawn: bands show the range from the smallest to the largest value." if envelopes else ""
-    comparable = truth is not None and len(lines) > 1 and not envelopes
-    return Chart(TIME, LABELS.get(quantity, ""), lines, reference=EXACT if comparable else "", remark=remark)
+    comparable = truth is not None and truth.is_exact and len(lines) > 1 and not envelopes
+    return Chart(TIME, LABELS.get(quantity, ""), lines, reference=lines[-1].label if comparable else "", remark=remark)
 
 
 def plot_over_time(results: Results, scene_name: str, quantity: Quantity, axes: "Axes") -> None:

@@ -13,7 +13,6 @@ import numpy as np
 
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.chart import Chart, Line, draw
-from dropspin.reports.plots.colours import EXACT
 from dropspin.reports.plots.style import MOST_POINTS, Array, at_one_step, stride
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 from dropspin.scenarios.rotations import cross, unrotate
@@ -83,7 +82,7 @@ def polhode_paths(results: Results, scene_name: str) -> list[tuple[Array, dict[s
     ]
     if truth is not None:
         exact = truth(np.linspace(0.0, min(scene.duration, truth.horizon), MOST_POINTS))
-        paths.append((principal_spin(scene, exact), {"label": EXACT, "width": 1.0, "dashes": "dashed"}))
+        paths.append((principal_spin(scene, exact), {"label": truth.word, "width": 1.0, "dashes": "dashed"}))
     return paths
 
 

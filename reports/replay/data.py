@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.reports.plots.colours import EXACT
 from dropspin.reports.replay.motions import Motion, Replay, axis_and_angle
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import about, unrotate
@@ -66,7 +65,7 @@ def _motion(motion: Motion, interval: float, tolerance: float) -> dict[str, Any]
     return {
         "label": motion.label,
         "colour": motion.colour,
-        "isExact": motion.label == EXACT and not motion.colour,
+        "isExact": not motion.colour,
         "count": int(at_stride.sum()),
         "between": frames.t[~at_stride].round(9).tolist(),
         "position": [quantised(column, tolerance)[0] for column in frames.position.T],

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring.comparison import Comparison, exactly
 from dropspin.comparisons.results.results import Results
-from dropspin.reports.plots.colours import EXACT, engine_colours
-from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
+from dropspin.reports.plots.colours import engine_colours
+from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, reference_for
 from dropspin.scenarios.mechanics import angular_momentum
 from dropspin.scenarios.rotations import angle_between_orientations, conjugate, cross, dot, multiply
 from dropspin.scenarios.state import UP
@@ -50,11 +50,10 @@ class Motion:
     """One body's motion.
 
     Attributes:
-        label: Label of the engine, or `EXACT`.
-        colour: Colour of the engine; empty for the exact solution, which is drawn in the text colour.
+        label: Label of the engine, or what the reference is: an exact solution or a recording.
+        colour: Colour of the engine; empty for the reference, which is drawn in the text colour.
         frames: States at a fixed stride, and those at impacts, from the start to the last finite one.
-        errors: Distance [m] and angle [rad] from the exact solution at each frame, shape (frames, 2), NaN after the end of the exact
-            solution; None without an exact solution.
+        errors: Distance [m] and angle [rad] from the reference at each frame, shape (frames, 2), NaN after its end; None without one.
         impacts: The impacts on the floor and on walls, in order.
     """
 
@@ -89,7 +88,7 @@ class Replay:
         scene: The scene.
         dt: Time step [s].
         interval: Time between frames [s].
-        motions: The motions of the engines, in order, and last the exact solution if there is one.
+        motions: The motions of the engines, in order, and last the reference if there is one.
     """
 
     scene: Scenario
@@ -142,8 +141,8 @@ def replay_of(results: Results, scene_name: str, dt: float | None = None) -> Rep
 
 
 def replay_together(scene: Scenario, dt: float, moved: Mapping[str, Trajectory]) -> Replay:
-    """Motions of a scene at a time step [s], by their labels, and the exact solution if there is one."""
-    every, truth, colours = _stride(scene.steps(dt)), truth_for(scene), engine_colours(tuple(moved))
+    """Motions of a scene at a time step [s], by their labels, and the exact solution or the recording if there is one."""
+    every, truth, colours = _stride(scene.steps(dt)), reference_for(scene), engine_colours(tuple(moved))
     motions = [_motion(scene, truth, label, colours[label], motion, every) for label, motion in moved.items()]
     if truth is not None:
         motions.append(_exact_motion(scene, truth, dt * every * np.arange(scene.steps(dt) // every + 1, dtype=np.float64)))
@@ -178,7 +177,7 @@ def _exact_motion(scene: Scenario, truth: Truth, times: Array) -> Motion:
     pairs = Trajectory.from_states(np.repeat([event.time for event in truth.events], 2), states)
     before = np.arange(0, len(states), 2)
     impacts = Impacts(pairs.t[before], *contact_impulses(scene, pairs, before, before + 1))
-    return Motion(EXACT, "", exactly(truth, times), None, impacts)
+    return Motion(truth.word, "", exactly(truth, times), None, impacts)
 
 
 def _errors(motion: Trajectory, exact: Trajectory) -> Array:

@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from dropspin.comparisons.judging.convergence import ARTEFACTS, SATURATION
+from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY
 from dropspin.comparisons.results.results import SMALLEST_STATED, Results, is_undecided
 from dropspin.reports.stories.numbers import formatted, observed_order
 
@@ -52,6 +53,10 @@ def _sentence(row: Mapping[Hashable, Any]) -> str:
         order = observed_order(float(row["value_of_order"]), *ends)
         halved = f" of {order}: halving dt gives about {formatted(value * 0.5 ** row['value_of_order'])}" if order else ""
         return f"Discretisation error{halved}."
+    if cause == WITHIN_UNCERTAINTY:
+        return "Within the uncertainty of the recording."
+    if cause == COMBINED:
+        return f"At least {formatted(row['lower_of_limit'])} is due to the model, the settings and the start together."
     if cause not in ("model", "setting"):
         return f"Set by {cause}, which is the engine's own: it {row['reason_of_limit']}."
     a_setting, a_model = "setting error: the calibrated profile has none or a smaller one", "model error, which no time step removes"

@@ -3,7 +3,7 @@
 import math
 import statistics
 from collections import Counter
-from collections.abc import Collection, Hashable, Mapping
+from collections.abc import Collection, Hashable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
+from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.results.results import SMALLEST_STATED, Results, Status, relative_sizes
 from dropspin.reports.stories.matrix import step_times
 from dropspin.reports.stories.numbers import duration, failing, formatted, in_ms, named, quantity, with_unit
@@ -92,7 +93,7 @@ class ProfileComparison:
 def profile_comparisons(results: Results) -> list[ProfileComparison]:
     """For each engine that was run with default and with calibrated settings, the share of its errors that is due to the settings."""
     frame = results.measurements
-    truths = frame[(frame["kind"] == "truth") & frame["value"].notna()]
+    truths = frame[(frame["kind"] == "truth") & frame["value"].notna() & ~frame["scene"].isin(results.recorded)]
     finest = truths[truths["dt"] == truths["dt"].min()].rename(columns={"value": "default"})
     comparisons = []
     for engine in results.engines:
@@ -176,6 +177,7 @@ def finding_sentences(results: Results) -> list[str]:
         remain = set(lasting.loc[lasting["engine"] == engine, "scene"])
         parts = [
             _convergence(results, engine, {scene: of[engine] for scene, of in statuses.items()}, remain),
+            *_beside_recordings(results, engine),
             *_cost(engine, times, results.provenance.get("compilation", {}).get(engine)),
         ]
         sentences.append(f"{ENGINE_NAMES.get(engine, engine)}: {'; '.join(parts)}.")
@@ -194,12 +196,25 @@ def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], 
         enough = is_sufficient(results.provenance["asked"]["dts"])
         none = "no asymptotic errors" + ("" if enough else ", which need three time steps that span a factor of four")
         return f"{', '.join(others)} of {counted(len(statuses), 'scene')}; {none}"
-    converges = ", ".join([f"converges in {kinds['converges']} of {counted(len(statuses), 'scene')}", *others])
+    exact = len(statuses) - len(results.recorded)
+    converges = ", ".join([*[f"converges in {kinds['converges']} of {counted(exact, 'scene')}"] * bool(exact), *others])
     found = mine[mine["kind"].isin(["truth", "invariant"]) & (mine["value"].abs() > SMALLEST_STATED)]
     found = found[~found["metric"].isin([*JUMPING, *ARTEFACTS])]
     finest = found[found["dt"] == found.groupby("scene")["dt"].transform("min")]
     wrong = finest[finest["verdict"].isin(["known", "limited", *FAILURES]) | finest["cause"].isin(["model", "setting"])]
     return f"{converges}{_largest(results, wrong)}"
+
+
+def _beside_recordings(results: Results, engine: str) -> Iterator[str]:
+    """How far an engine is from each recording at the finest time step, with the uncertainty."""
+    of_engine = results.table[results.table["engine"] == engine]
+    for scene in results.recorded:
+        metric = leading_metric(results.scenes[scene])
+        rows = of_engine[(of_engine["scene"] == scene) & (of_engine["metric"] == metric)].set_index("kind")
+        finest = rows.loc[rows["dt"] == rows["dt"].min(), "value"]
+        if "uncertainty" in finest:
+            value = with_unit(f"{formatted(finest['truth'])} ± {formatted(finest['uncertainty'])}", METRICS[metric].unit)
+            yield f"{quantity(metric)} {value} from the recording in {scene}"
 
 
 def _largest(results: Results, errors: "pd.DataFrame") -> str:

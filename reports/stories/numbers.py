@@ -6,7 +6,7 @@ from functools import cache
 from typing import TypeVar
 
 from dropspin.comparisons.judging.error_budget import is_determined
-from dropspin.comparisons.judging.verdicts import WORDS
+from dropspin.comparisons.judging.verdicts import COMBINED, WORDS
 from dropspin.comparisons.measuring.symmetries import kind_of
 from dropspin.scenarios.text import counted, rounded
 
@@ -114,10 +114,10 @@ def with_unit(value: str, of: str) -> str:
 def subject(metric: str, kind: str, truth: str = "") -> str:
     """The subject of a row in words, such as `order of orientation error`; for a row of kind `baseline`, that of the accepted result."""
     words = metric.replace("_", " ")
-    prefixed = {"order": f"order of {words}", "asymptotic_error": f"asymptotic {words}", "ensemble": f"mean {words}"}
+    before = {"order": "order of", "asymptotic_error": "asymptotic", "ensemble": "mean", "uncertainty": "uncertainty of"}
     if kind_of(metric) is not None:
         return f"difference of the motion {words}"
-    return prefixed.get(_accepted_kinds().get(truth, kind), words)
+    return f"{before.get(_accepted_kinds().get(truth, kind), '')} {words}".lstrip()
 
 
 @cache
@@ -136,4 +136,5 @@ def trend(asymptotic_error: float, cause: str, order: str = "") -> str:
     """The behaviour of an error as dt → 0, in a few words; the order is that of `observed_order`."""
     if cause == "discretisation":
         return order or "→ 0"
-    return {"model": f"→ {formatted(asymptotic_error)}", "setting": f"→ {formatted(asymptotic_error)}, a setting"}.get(cause, cause)
+    value = f"→ {formatted(asymptotic_error)}"
+    return {"model": value, "setting": f"{value}, a setting", COMBINED: f"{value}: {COMBINED}"}.get(cause, cause)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from dropspin.comparisons.judging.verdicts import MARKS
+from dropspin.comparisons.judging.verdicts import COMBINED, MARKS
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.document import Heading, Part, Sentences, Table
@@ -19,7 +19,7 @@ def scene_parts(results: Results) -> list[Part]:
         parts += [
             Heading(": ".join(filter(None, [name, results.scenes[name].summary])), on_terminal=True),
             Table(_rows(of_scene), ["spread", *reversed(results.engines)]),
-            Sentences([*_trends(of_scene, name), *_ensemble(of_scene, name)], style="dim"),
+            Sentences([*_trends(of_scene, name), *_uncertainties(of_scene), *_ensemble(of_scene, name)], style="dim"),
             Table(law_rows(of_scene)),
             Sentences([f"{row['engine']}: {word(row['verdict'])}. {row['reason']}" for row in remarks]),
         ]
@@ -44,12 +44,20 @@ def _rows(results: Results) -> list[dict[str, str]]:
 def _trends(results: Results, name: str) -> Iterator[str]:
     """For each engine, a sentence with the observed orders and the errors that do not vanish as dt → 0."""
     frame = results.table
-    wrong = frame[(frame["kind"] == "asymptotic_error") & frame["cause"].isin(["model", "setting"])]
+    wrong = frame[(frame["kind"] == "asymptotic_error") & frame["cause"].isin(["model", "setting", COMBINED])]
     for engine in results.engines:
         errors = wrong[wrong["engine"] == engine].to_dict("records")
         remain = [f"{row['metric'].replace('_', ' ')} {trend(row['value'], row['cause'])}" for row in errors]
         if trends := [*filter(None, [orders(results, name, engine)]), *remain]:
             yield f"as dt → 0, {engine}: {', '.join(trends)}"
+
+
+def _uncertainties(results: Results) -> Iterator[str]:
+    """The uncertainty of the scene's recording in each metric at the finest time step."""
+    frame = results.table[results.table["kind"] == "uncertainty"]
+    for metric, rows in frame[frame["dt"] == frame["dt"].min()].groupby("metric", sort=False):
+        values = [f"{row['engine']} {with_unit(formatted(row['value']), row['unit'])}" for row in rows.to_dict("records")]
+        yield f"uncertainty of the recording, {str(metric).replace('_', ' ')}: {', '.join(values)}"
 
 
 def _ensemble(results: Results, name: str) -> Iterator[str]:

@@ -4,6 +4,7 @@ import numpy as np
 
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.surfaces import Surface
+from dropspin.scenarios.text import counted
 
 
 def modelled(scene: Scenario) -> list[str]:
@@ -27,6 +28,8 @@ def modelled(scene: Scenario) -> list[str]:
         parts[-1] += f", by factors of {linear:g} and {angular:g} per step of {scene.damping.factor_dt:g} s"
     if scene.ensemble is not None:
         parts.append(f"{scene.ensemble.size} starts drawn around the scene's own")
+    if scene.recording is not None:
+        parts.append(f"{counted(len(scene.recording.tosses), 'measured toss', 'measured tosses')}")
     return parts
 
 

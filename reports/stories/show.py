@@ -10,7 +10,7 @@ from dropspin.comparisons.engines.options import spelled
 from dropspin.comparisons.judging.judge import verify_expectations
 from dropspin.reports.stories.numbers import bound
 from dropspin.reports.stories.scene import left_out, modelled
-from dropspin.scenarios import Scenario, Truth, truth_for
+from dropspin.scenarios import Scenario, Truth, reference_for
 from dropspin.scenarios.model import Expectation
 from dropspin.scenarios.problems import identifier
 from dropspin.scenarios.state import VELOCITY
@@ -25,7 +25,7 @@ Rows = list[dict[str, str]]
 
 def scene_rows(scene: Scenario) -> Rows:
     """The description of a scene: what it models, its exact solution and its expectations."""
-    truth = truth_for(scene)
+    truth = reference_for(scene)
     verify_expectations(scene, truth, [])
     start = scene.start
     facts = {
@@ -43,9 +43,9 @@ def scene_rows(scene: Scenario) -> Rows:
     }
     if truth and truth.events:
         facts["impacts"] = f"{len(truth.events)}, the first at {truth.events[0].time:.6f} s"
-    if truth and not truth.covers_all(scene.duration):
+    if truth and truth.is_exact and not truth.covers_all(scene.duration):
         facts["valid until"] = f"{truth.horizon:.6f} s: {truth.ends}"
-    if truth and (others := other_laws(scene)):
+    if truth and truth.is_exact and (others := other_laws(scene)):
         facts["other laws"] = _other_laws(truth, others)
     for expectation in scene.expect:
         facts[f"expect {expectation.metric} ({_applies_to(expectation)})"] = f"{_allowed(expectation)}: {expectation.reason}"

@@ -1,4 +1,7 @@
-"""Exact solutions ("truths"). Each file solves one problem and states its formula, its source and its range of validity."""
+"""Exact solutions ("truths"). Each file solves one problem and states its formula, its source and its range of validity.
+
+`measured` is no exact solution: `reference_for` gives it for a scene with a recording, `truth_for` never does.
+"""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -15,6 +18,7 @@ from dropspin.scenarios.truths.coulomb_slide import coulomb_slide
 from dropspin.scenarios.truths.coulomb_turn import coulomb_turn
 from dropspin.scenarios.truths.flight import flight
 from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, LAWS, Law, law_of
+from dropspin.scenarios.truths.measured import measured
 from dropspin.scenarios.truths.near import until_near
 from dropspin.scenarios.truths.point_contact import point_contact
 from dropspin.scenarios.truths.rocking import rocking
@@ -22,7 +26,7 @@ from dropspin.scenarios.truths.rolling import rolling
 from dropspin.scenarios.truths.slipping import slipping
 from dropspin.scenarios.truths.truth import Impact, Truth
 
-__all__ = ["LAWS", "Impact", "Law", "Truth", "other_laws", "truth_for"]
+__all__ = ["LAWS", "Impact", "Law", "Truth", "other_laws", "reference_for", "truth_for"]
 
 Solution = Callable[[Scenario, Floor], Truth | None]
 ON_FLOOR: tuple[Solution, ...] = (
@@ -70,6 +74,15 @@ def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
     if law is not None:
         return corner_impact(scene, floor, law)
     return next(filter(None, (problem(scene, floor) for problem in ON_FLOOR)), None)
+
+
+def reference_for(scene: Scenario) -> Truth | None:
+    """Return the motion with which motions of a scene are compared: its exact solution, or the first toss of its recording.
+
+    Returns:
+        As `truth_for`; `is_exact` is False for a toss.
+    """
+    return truth_for(scene) if scene.recording is None else measured(scene.recording, scene.recording.tosses[0])
 
 
 def _among_planes(scene: Scenario, floor: Floor, law: Law | None) -> Truth | None:

@@ -1,4 +1,4 @@
-"""The type of an exact solution: the motion, its impacts, and the time up to which it is valid."""
+"""The type of a reference, an exact solution or a measured motion: the motion, its impacts, and the time up to which it is valid."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -11,6 +11,8 @@ from dropspin.scenarios.trajectory import Trajectory
 
 States = Callable[[Array], Array]
 """A function from times [s], shape (n,), to states, shape (n, 13)."""
+EXACT, RECORDED = "exact solution", "recording"
+"""What a reference is, in words, and its label in plots and replays."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,7 @@ def piece(begins: Array, t: Array) -> NDArray[np.intp]:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The exact motion of a scene.
+    """The exact motion of a scene, or a measured one.
 
     Attributes:
         name: Short name, which is also in the column `truth` of the results.
@@ -51,6 +53,7 @@ class Truth:
         events: The impacts within the scene's duration, in order.
         horizon: Time up to which the formula is valid [s].
         ends: Why it is not valid after the horizon, if the horizon is before the end of the scene.
+        frames: The times at which a measured motion is known [s], shape (n,); None for an exact one, which is known at all times.
     """
 
     name: str
@@ -59,6 +62,17 @@ class Truth:
     events: tuple[Impact, ...] = ()
     horizon: float = float("inf")
     ends: str = ""
+    frames: Array | None = None
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether it is an exact solution, and no measured motion."""
+        return self.frames is None
+
+    @property
+    def word(self) -> str:
+        """What it is, in words."""
+        return EXACT if self.is_exact else RECORDED
 
     def covers(self, t: Array) -> NDArray[np.bool_]:
         """Mask of the times [s] up to the horizon, with a margin, because rounding of n dt may exceed the horizon."""
@@ -71,7 +85,8 @@ class Truth:
     def after(self, delay: float) -> "Truth":
         """The motion that starts at the time `delay` [s], which must not be after the first impact."""
         later = tuple(replace(event, time=event.time - delay) for event in self.events)
-        return replace(self, states=lambda t: self.states(t + delay), events=later, horizon=self.horizon - delay)
+        frames = None if self.frames is None else self.frames - delay
+        return replace(self, states=lambda t: self.states(t + delay), events=later, horizon=self.horizon - delay, frames=frames)
 
     def __call__(self, times: ArrayLike) -> Trajectory:
         """The motion at times [s] from 0 to `horizon`, shape (n,).
@@ -81,5 +96,5 @@ class Truth:
         """
         t = np.atleast_1d(np.asarray(times, dtype=float))
         if not np.all((t >= 0.0) & self.covers(t)):
-            raise ValueError(f"the exact solution {self.name!r} is valid for 0 <= t <= {self.horizon:.6g} s")
+            raise ValueError(f"the {self.word} {self.name!r} is valid for 0 <= t <= {self.horizon:.6g} s")
         return Trajectory.from_states(t, self.states(t))

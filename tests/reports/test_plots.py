@@ -10,13 +10,14 @@ import dropspin as ds
 from dropspin.comparisons.results.store import save
 from dropspin.comparisons.results.table import as_table
 from dropspin.reports import plots
-from dropspin.reports.plots.colours import EXACT, engine_styles
+from dropspin.reports.plots.colours import engine_styles
 from dropspin.reports.plots.figures import ensemble_charts
 from dropspin.reports.plots.spins import energy_ellipsoid, polhode_paths
 from dropspin.reports.plots.style import power
 from dropspin.scenarios import Trajectory, members, truth_for
 from dropspin.scenarios.mechanics import energy, kinetic_energy
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
+from dropspin.scenarios.truths.truth import EXACT
 
 DT = 1e-3
 

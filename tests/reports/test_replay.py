@@ -16,7 +16,6 @@ import dropspin as ds
 from dropspin.comparisons.results.store import save
 from dropspin.reports.commands.replay import replay_command
 from dropspin.reports.html.replay import replay_page
-from dropspin.reports.plots.colours import EXACT
 from dropspin.reports.replay import replay_of
 from dropspin.reports.replay.clip import _in_box, write_clip
 from dropspin.reports.replay.data import as_data
@@ -25,6 +24,7 @@ from dropspin.scenarios import DropspinError, Trajectory, truth_for
 from dropspin.scenarios.mechanics import angular_momentum
 from dropspin.scenarios.rotations import about, angle_between_orientations, multiply, rotate
 from dropspin.scenarios.surfaces import Wall
+from dropspin.scenarios.truths.truth import EXACT
 
 
 @pytest.fixture(scope="module")

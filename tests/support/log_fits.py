@@ -47,11 +47,11 @@ def true_states(random, count, height=0.0):
     return states
 
 
-def tosses(random, count, engine, friction, restitution, frames=FRAMES, height=0.0):
+def tosses(random, count, engine, friction, restitution, frames=FRAMES, height=0.0, dt=1.0 / RATE / STEPS_PER_FRAME):
     """Flights of tosses that an engine makes, with noise in the frames after the flight and errors in the states at its end."""
     states, scene = true_states(random, count, height), with_values(scene_of(HEADER), "floor", friction=friction, restitution=restitution)
     t = np.arange(frames + 1) / RATE
-    [motions] = poses(engine_entry(engine), [scene], Launches(states, np.tile(t, (count, 1))), 1.0 / RATE / STEPS_PER_FRAME)
+    [motions] = poses(engine_entry(engine), [scene], Launches(states, np.tile(t, (count, 1))), dt)
     noise = random.normal(size=(count, frames + 1, 6)) * WHITE
     positions = motions[..., POSITION] + noise[..., :3]
     orientations = multiply(quaternions(noise[..., 3:]), motions[..., ORIENTATION])

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.scenarios import load, truth_for
+from dropspin.scenarios import load, reference_for, truth_for
 from dropspin.scenarios.problems import UNKNOWN, problems
 from dropspin.scenarios.state import ORIENTATION, PARTS, RATES
 from support.problem_statements import CONVENTIONS, KINDS, laws, number, statement
@@ -43,7 +43,7 @@ def index_table():
     rows = [["problem", "scene", "subject", "exact solution"]]
     for problem in problems().values():
         scene = load(problem.scene)
-        truth = truth_for(scene)
+        truth = reference_for(scene)
         known = UNKNOWN if truth is None else f"{truth.name}: {KINDS[truth.name]}"
         rows.append([f"[{problem.number}](problems/{problem.number}.md)", problem.scene, scene.summary, known])
     return table(rows)
@@ -52,7 +52,7 @@ def index_table():
 def sheet(problem):
     """The sheet of a problem, Markdown."""
     scene = load(problem.scene)
-    truth = truth_for(scene)
+    truth = None if scene.recording is not None else truth_for(scene)
     parts = [
         f"# {problem.number}: {scene.summary}",
         f"Problem {problem.identifier}, scene `{problem.scene}`, keywords: {', '.join(scene.tags)}. [All problems](../problems.md).",
@@ -60,8 +60,8 @@ def sheet(problem):
         paragraph(CONVENTIONS),
         table([["", "value"], *map(list, statement(scene).items())]),
         "\n".join(f"- {law}" for law in laws(scene, truth)),
-        "## Exact solution",
-        *_solution(scene, truth),
+        "## Exact solution" if scene.recording is None else "## Recording",
+        *(_solution(scene, truth) if scene.recording is None else _recording(scene)),
         "## Tolerance",
         paragraph(("" if truth is None else EXACT) + TOLERANCE + (ENERGY if any("energy" in one.metric for one in scene.expect) else "")),
         _tolerances(scene),
@@ -90,6 +90,19 @@ def _solution(scene, truth):
         _states(scene, truth),
         *_impacts(scene, truth),
         *_horizon(scene, truth),
+    ]
+
+
+def _recording(scene):
+    tosses = scene.recording.tosses
+    return [
+        paragraph(
+            f"""No exact solution, but {len(tosses)} measured tosses of {sum(len(toss.t) for toss in tosses):,} frames in all,
+`scenarios/catalogue/{scene.name}.json`: of each toss the times, positions and orientations of its frames, the state at the end of its
+flight, by which it starts, and 19 states that the flight allows as well. The start above is that of the first. An error is a mean over
+the tosses, and the recording leaves it uncertain by what an engine makes of these states and of the noise of a frame
+([measured motions](../measured.md))."""
+        )
     ]
 
 

@@ -75,6 +75,7 @@ The floor exerts a vertical force F on it, and no moment: M dv/dt = M g + F, dL/
 """For the name of each exact solution, the laws of the motion; those that depend on the scene are added by `laws`."""
 
 KINDS = {
+    "measured": "a recording, no exact solution",
     "ball-impact": "closed form",
     "bounce-ladder": "closed form",
     "corner-impact": "elliptic functions; impact times by root finding",
@@ -160,7 +161,8 @@ def _shape(body):
     if body.shape == "sphere":
         return f"ball of radius {number(body.radius)} m, centre of mass at its centre"
     if body.shape == "box":
-        return f"box with the half extents {vector(body.half_extents)} m along its axes, centre of mass at its centre"
+        at = f"{vector(body.centre)} m from its centre" if body.centre.any() else "at its centre"
+        return f"box with the half extents {vector(body.half_extents)} m along its axes, centre of mass {at}"
     count = f"{len(body.vertices)} points"
     if len(body.vertices) > MOST_POINTS:
         return f"a mesh; planes touch its {count}, those of the file beside the scene's, taken from the centre of mass"

@@ -74,12 +74,19 @@ def test_finding_is_printed_with_alternatives_and_remedy_and_is_exit_code_1(reco
 def test_scene_of_each_toss_continues_it(cube):
     folder, _ = cube
     files = sorted((folder / "out" / "scenes").glob("*.toml"))
-    assert len(files) == 100
+    assert len(files) == 101
     flights = flights_in("toss-cube")
     [start] = [start for start in flights.starts() if start.toss.name == "4"]
     scene = load(folder / "out" / "scenes" / "toss-4.toml")
-    np.testing.assert_allclose(scene.initial_state, start.state, rtol=0.0, atol=1e-15)
-    assert scene.duration == pytest.approx(start.toss.t[-1] - start.toss.t[start.frame])
+    np.testing.assert_allclose(scene.initial_state, start.state, rtol=0.0, atol=1e-9)
+    [toss] = scene.recording.tosses
+    frames = start.toss.t[start.frame + 1 :] - start.toss.t[start.frame]
+    np.testing.assert_allclose(toss.t, frames, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(toss.position, start.toss.position[start.frame + 1 :], rtol=0.0, atol=1e-6)
+    assert frames[-1] < scene.duration < frames[-1] + 0.03
+    every = load(folder / "out" / "scenes" / "tosses.toml")
+    assert len(every.recording.tosses) == 100
+    np.testing.assert_array_equal(every.initial_state, scene.initial_state)
     assert scene.floor == flights.log.header.floor
 
 

@@ -79,7 +79,7 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     """The answers of a run, for each metric of `QUESTIONS` that it has and each engine that was tried in one of its scenes.
 
     An error is within the tolerance if its size plus its uncertainty, the column `tolerance`, is; it is beyond if its size minus that
-    uncertainty is. A time step at which the engine broke down is beyond. Scenes with a recording in place of an exact solution do not count.
+    uncertainty is. A time step at which the engine broke down is beyond. Scenes that are compared with a recording do not count.
 
     Args:
         results: The run.

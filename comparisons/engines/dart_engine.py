@@ -28,7 +28,7 @@ REASONS = {
 
 
 class Dart(Engine):
-    """DART's rigid body over a plane, or over a box; or with DART's defaults (profile=default)."""
+    """DART's rigid body over a plane, or over a box; or with its defaults."""
 
     name, order, reasons = "dart", 1.0, REASONS
     shapes: ClassVar = ("sphere", "box")

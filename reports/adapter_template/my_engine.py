@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 import dropspin as ds
 
@@ -66,27 +65,27 @@ class MyEngineBatch(ds.BatchSimulation):
                 if hit.any():
                     self.collide(hit, self.floor.restitution, self.floor.coefficient, self.floor.rest_speed)
             self.x = self.x + self.dt * self.v
-            self.q = (Rotation.from_rotvec(self.dt * self.w) * Rotation.from_quat(self.q)).as_quat()
+            turned = self.q + 0.5 * self.dt * product(self.w, self.q)
+            self.q = turned / np.linalg.norm(turned, axis=1, keepdims=True)
         # An engine that computes asynchronously waits here until the states are there (JAX: block_until_ready; Warp: wp.synchronize).
 
     def gyroscopic_acceleration(self) -> Array:
         """Angular acceleration without torque, by Euler's equations [rad/s²], shape (size, 3)."""
-        to_world = Rotation.from_quat(self.q)
-        w = to_world.apply(self.w, inverse=True)  # in the body frame
-        return to_world.apply(np.cross(self.moments * w, w) / self.moments)
+        w = rotated(self.w, self.q * [-1.0, -1.0, -1.0, 1.0])  # in the body frame
+        return rotated(cross(self.moments * w, w) / self.moments, self.q)
 
     def collide(self, hit: NDArray[np.bool_], restitution: float, friction: float, rest_speed: float) -> None:
         """Apply the impulses of the floor: Newton's restitution, and Coulomb's friction against the slip of the contact point."""
         v, w, arm, moment = self.v[hit], self.w[hit], np.array([[0.0, -self.radius, 0.0]]), self.moments[0]
         normal = -self.mass * v[:, 1] * (1.0 + np.where(-v[:, 1] >= rest_speed, restitution, 0.0))
-        slip = (v + np.cross(w, arm)) * [1.0, 0.0, 1.0]
+        slip = (v + cross(w, arm)) * [1.0, 0.0, 1.0]
         speed = np.linalg.norm(slip, axis=1)
         sticking = speed / (1.0 / self.mass + self.radius**2 / moment)  # the impulse that ends the slip
         tangential = np.minimum(friction * normal, sticking)  # friction is a Coulomb coefficient, inf on a floor that never lets slip
         impulse = -slip * (tangential / np.where(speed > 0.0, speed, 1.0))[:, None]
         impulse[:, 1] = normal
         self.v[hit] += impulse / self.mass
-        self.w[hit] += np.cross(arm, impulse) / moment
+        self.w[hit] += cross(arm, impulse) / moment
 
     def states(self) -> Array:
         """Position, orientation, velocity and angular velocity, shape (size, 13), in memory of the processor, not of a GPU."""
@@ -95,3 +94,19 @@ class MyEngineBatch(ds.BatchSimulation):
     def as_built(self) -> ds.AsBuilt:
         """The mass, inertia and gravity that the engine has, which are compared with the scene; optional."""
         return ds.AsBuilt(self.mass, np.diag(self.moments), self.gravity)
+
+
+def product(w: Array, q: Array) -> Array:
+    """Products of quaternions (w, 0) and q, [x, y, z, w] each, shape (size, 4)."""
+    return np.column_stack([q[:, 3:] * w + cross(w, q[:, :3]), -np.sum(w * q[:, :3], axis=1)])
+
+
+def rotated(v: Array, q: Array) -> Array:
+    """Vectors, shape (size, 3), rotated by unit quaternions, shape (size, 4)."""
+    twice = 2.0 * cross(q[:, :3], v)
+    return v + q[:, 3:] * twice + cross(q[:, :3], twice)
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross products, shape (size, 3); in few rows faster than numpy.cross."""
+    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]

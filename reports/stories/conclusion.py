@@ -24,6 +24,8 @@ def conclusion(results: Results) -> list[str]:
     if tested:
         recommended = [_recommendation(answers, within) for answers in tested[:MOST_QUESTIONS]]
         return [*recommended, *_cost(results), *_undecided(results)]
+    if not questions and results.recorded:
+        return []
     none = f"No recommendation: a question needs {ENOUGH} scenes that test it. dropspin run, without names, runs the core catalogue."
     return [*(_statement(answers, within) for answers in list(questions.values())[:MOST_QUESTIONS]), none]
 

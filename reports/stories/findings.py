@@ -5,6 +5,7 @@ import statistics
 from collections import Counter
 from collections.abc import Collection, Hashable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -177,7 +178,6 @@ def finding_sentences(results: Results) -> list[str]:
         remain = set(lasting.loc[lasting["engine"] == engine, "scene"])
         parts = [
             _convergence(results, engine, {scene: of[engine] for scene, of in statuses.items()}, remain),
-            *_beside_recordings(results, engine),
             *_cost(engine, times, results.provenance.get("compilation", {}).get(engine)),
         ]
         sentences.append(f"{ENGINE_NAMES.get(engine, engine)}: {'; '.join(parts)}.")
@@ -205,16 +205,15 @@ def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], 
     return f"{converges}{_largest(results, wrong)}"
 
 
-def _beside_recordings(results: Results, engine: str) -> Iterator[str]:
-    """How far an engine is from each recording at the finest time step, with the uncertainty."""
-    of_engine = results.table[results.table["engine"] == engine]
-    for scene in results.recorded:
-        metric = leading_metric(results.scenes[scene])
+def beside_recordings(results: Results) -> Iterator[str]:
+    """A sentence for each engine and recording: how far apart they are at the finest time step, with the uncertainty."""
+    for engine, scene in product(results.engines, results.recorded):
+        of_engine, metric = results.table[results.table["engine"] == engine], leading_metric(results.scenes[scene])
         rows = of_engine[(of_engine["scene"] == scene) & (of_engine["metric"] == metric)].set_index("kind")
         finest = rows.loc[rows["dt"] == rows["dt"].min(), "value"]
         if "uncertainty" in finest:
             value = with_unit(f"{formatted(finest['truth'])} ± {formatted(finest['uncertainty'])}", METRICS[metric].unit)
-            yield f"{quantity(metric)} {value} from the recording in {scene}"
+            yield f"{engine}: {quantity(metric)} {value} from the recording in {scene}."
 
 
 def _largest(results: Results, errors: "pd.DataFrame") -> str:

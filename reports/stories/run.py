@@ -13,6 +13,7 @@ from dropspin.reports.stories.failures import Failure, failure_parts, failures, 
 from dropspin.reports.stories.findings import (
     Counts,
     ProfileComparison,
+    beside_recordings,
     counts,
     finding_sentences,
     missing_engines,
@@ -56,7 +57,7 @@ def overview(results: Results) -> Overview:
     about_engines = [*missing_engines(results), *(profile.sentence for profile in profiles)]
     return Overview(
         verdict=verdict_sentence(results, tally),
-        conclusion=[*_quick(results), *about_engines, *conclusion(results), *reproduce_drawn(results)],
+        conclusion=[*_quick(results), *about_engines, *conclusion(results), *beside_recordings(results), *reproduce_drawn(results)],
         findings=finding_sentences(results),
         counts=tally,
         statuses=results.statuses(),

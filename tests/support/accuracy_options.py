@@ -118,7 +118,7 @@ class Substeps(Wang):
     """A fixed number of sub-steps a step, by methods without a model error in scenes that do not need an exact impact."""
 
     name = "substeps"
-    choices: ClassVar = {"rotation": ("rk4",), "law": ("coulomb",), "contact": ("sequential",), "correction": ("none",)}
+    choices: ClassVar = {"rotation": ("rk4",), "law": ("coulomb",), "contact": ("sequential",)}
     numbers: ClassVar = {"substeps": NumericOption(8, 1, 64)}
     restitution_factor = 1.0
 

@@ -28,7 +28,7 @@ REASONS = {
 
 
 class Dart(Engine):
-    """DART's rigid body over a plane or a box, or its defaults."""
+    """DART's rigid body over a plane or box, or its defaults."""
 
     name, order, reasons = "dart", 1.0, REASONS
     shapes: ClassVar = ("sphere", "box")

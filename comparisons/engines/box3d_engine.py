@@ -8,7 +8,7 @@ from robox3d._ffi import ffi, lib
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Engine, Simulation
 from dropspin.comparisons.engines.packages import version
-from dropspin.comparisons.engines.rapier_scenes import GRIPPING, WHY_DAMPING, damping_of, refusal, surface_of
+from dropspin.comparisons.engines.rapier_scenes import GRIPPING, damping_of, refusal, surface_of, why_damping
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.state import PARTS
@@ -25,7 +25,7 @@ BODY = {
 }
 REASONS = {name: why for name, (_, why) in (WORLD | BODY).items()} | {
     "substeps": "Box3D's examples take as many",
-    "linearDamping": f"{WHY_DAMPING.replace('Rapier', 'Box3D')}, with the substep for dt; angularDamping is the same",
+    "linearDamping": f"{why_damping('Box3D')}, with the substep for dt; angularDamping is the same",
     "friction": f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution",
 }
 

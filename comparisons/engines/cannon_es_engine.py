@@ -42,7 +42,7 @@ class CannonES(NodeEngine):
         return mapping.refusal_of_floor(scene, self.option("floor")) or mapping.refusal_of_rest_speed(scene, "cannon-es")
 
     def world_settings(self, scene: Scenario, dt: float) -> dict[str, Any]:
-        floor, rates = scene.floor, scene.damping.rates if scene.damping else {"linear": 0.0, "angular": 0.0}
+        floor, rates = scene.floor, mapping.decay_rates(scene)
         damping = {f"{motion}Damping": float(-np.expm1(-rate)) for motion, rate in rates.items()}
         contact: dict[str, Any] = {"restitution": floor.restitution, "friction": mapping.friction_of(floor, GRIPPING)} if floor else {}
         if self.is_default:

@@ -39,7 +39,7 @@ class Havok(NodeEngine):
         return refusal(scene, "box", "Havok")
 
     def world_settings(self, scene: Scenario, dt: float) -> dict[str, Any]:
-        floor, rates = scene.floor, scene.damping.rates if scene.damping else {"linear": 0.0, "angular": 0.0}
+        floor, rates = scene.floor, mapping.decay_rates(scene)
         surface = {"restitution": floor.restitution, "friction": mapping.friction_of(floor, GRIPPING)} if floor else {}
         damping = {f"{motion}Damping": rate for motion, rate in rates.items()}
         if self.is_default:

@@ -42,7 +42,7 @@ class Jolt(NodeEngine):
         return mapping.refusal_of_floor(scene, self.option("floor"))
 
     def world_settings(self, scene: Scenario, dt: float) -> dict[str, Any]:
-        floor, rates = scene.floor, scene.damping.rates if scene.damping else {"linear": 0.0, "angular": 0.0}
+        floor, rates = scene.floor, mapping.decay_rates(scene)
         damping = {f"m{motion.title()}Damping": float(-np.expm1(-rate * dt)) / dt for motion, rate in rates.items()}
         surface = {"mRestitution": floor.restitution, "mFriction": mapping.friction_of(floor, GRIPPING)} if floor else {}
         if self.is_default:

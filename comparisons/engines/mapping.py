@@ -103,6 +103,11 @@ def friction_of(surface: Surface, gripping: float) -> float:
     return gripping if surface.friction == "infinite" else surface.coefficient
 
 
+def decay_rates(scene: Scenario) -> dict[str, float]:
+    """The decay rates of the `linear` and the `angular` velocity [1/s], 0 without damping."""
+    return scene.damping.rates if scene.damping else {"linear": 0.0, "angular": 0.0}
+
+
 def bodies_in(scene: Scenario, beside: str) -> list[Scenario]:
     """The scene, and the one of the heavy body far away if it is beside."""
     return [scene] if beside == "none" else [scene, heavy_neighbour(scene)]

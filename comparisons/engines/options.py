@@ -45,7 +45,7 @@ class Setting(NamedTuple):
 
     Attributes:
         default: The library's own value: a number (a whole one is an `int`), numbers, or one of `values`.
-        what: What it is.
+        what: A description in a few words.
         calibrated: Its value in the calibrated profile; None if that is the library's own, or computed.
         why: The reason for the value in the calibrated profile.
         unit: Its unit.

@@ -11,7 +11,7 @@ import numpy as np
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.node_engine import NodeEngine
 from dropspin.comparisons.engines.packages import RAPIER_JS
-from dropspin.comparisons.engines.rapier_scenes import WHY_DAMPING, WHY_FRICTION, damping_of, refusal, surface_of
+from dropspin.comparisons.engines.rapier_scenes import WHY_FRICTION, damping_of, refusal, surface_of, why_damping
 from dropspin.scenarios import Scenario
 
 LENGTH = 1e6
@@ -23,7 +23,7 @@ PARAMETERS = {
 }
 REASONS = {name: why for name, (_, why) in PARAMETERS.items()} | {
     "normalizedPredictionDistance": "units: a step's fall; at 2 cm a rocking block errs by 0.026 rad, not 1.5e-3",
-    "linearDamping": f"{WHY_DAMPING}; angularDamping is the same",
+    "linearDamping": f"{why_damping()}; angularDamping is the same",
     "friction": WHY_FRICTION,
 }
 """Effects were measured at 1 ms without the one setting."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from dropspin.comparisons.engines.options import Setting
-from dropspin.comparisons.engines.rapier_scenes import WHY_DAMPING, WHY_FRICTION
+from dropspin.comparisons.engines.rapier_scenes import WHY_FRICTION, why_damping
 
 LARGEST = float(np.finfo(np.float32).max)
 OFF_ON = ("false", "true")
@@ -61,7 +61,7 @@ BODY = {
         values=OFF_ON,
         is_computed=True,
     ),
-    "linear_damping": Setting(0.0, "damping", why=f"{WHY_DAMPING}; angular_damping is the same", unit="1/s", is_computed=True),
+    "linear_damping": Setting(0.0, "damping", why=f"{why_damping()}; angular_damping is the same", unit="1/s", is_computed=True),
     "angular_damping": Setting(0.0, "damping of rotation", unit="1/s", is_computed=True),
 }
 """Of the body."""

@@ -87,7 +87,7 @@ ACCELERATION, OFFSET = slice(0, 3), slice(3, 6)
 
 
 def departures(flight: Flight, known: Array) -> Samples:
-    """The tracked point less the motion by known shared parameters, shape (6,), as samples with own parameters alone."""
+    """What the tracked point departs by from the motion of known shared parameters, shape (6,): samples of x₀ and v₀ alone."""
     t, rows = flight.t[:, np.newaxis, np.newaxis], flight.rows
     motion = t[:, 0] ** 2 / 2.0 * known[ACCELERATION] + rotate(flight.toss.orientation[rows], known[OFFSET])
     return Samples(flight.t, flight.toss.position[rows] - motion, _lines(t), np.empty((len(t), 3, 0)))

@@ -1,10 +1,8 @@
 """Start phases, and every metric of the motions from them: the same drop from 32 starts averages out where in a time step it lands.
 
-A toss of a recording starts at the end of its flight. Its four phases are earlier states of this flight.
-
-
 An engine detects an impact at the first step that ends below the floor, so its error depends on the phase of the impact within a step.
-Starts that lie equal parts of a step further along the scene's motion draw that phase evenly (stratified sampling).
+Starts that lie equal parts of a step further along the scene's motion draw that phase evenly (stratified sampling). A toss of a
+recording starts at the end of its flight; its four phases are earlier states of this flight.
 """
 
 from collections.abc import Sequence

@@ -43,7 +43,7 @@ class ComparedLog(Study):
         found = self.comparison
         rows = [{"row": part, **asdict(row)} for part in ("errors", "pairs", "parts") for row in getattr(found, part)]
         rows += [{"row": "groups", "quantity": quantity, "engines": group} for quantity, groups in found.groups.items() for group in groups]
-        return with_all_columns([*rows, *({"row": "left out", "engine": engine, "reason": why} for engine, why in found.left_out.items())])
+        return with_all_columns(rows, found.left_out)
 
     def document(self) -> Document:
         """The errors, the groups, the differences and the parts."""

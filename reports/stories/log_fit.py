@@ -35,7 +35,7 @@ class FittedLog(Study):
         fit = self.fit
         rows = [{"row": "estimates", **asdict(one), "discrepancy": fit.discrepancies[one.engine]} for one in fit.estimates]
         rows += [{"row": "disagreements", **asdict(one)} for one in fit.disagreements]
-        return with_all_columns([*rows, *({"row": "left out", "engine": engine, "reason": why} for engine, why in fit.left_out.items())])
+        return with_all_columns(rows, fit.left_out)
 
     def document(self) -> Document:
         """A row for each engine, and a sentence for each disagreement and each parameter that the tosses do not identify."""

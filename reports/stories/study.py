@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict
@@ -29,7 +30,8 @@ class Study(BaseModel):
         """The page, which is also a section of a report and the output on a terminal."""
 
 
-def with_all_columns(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Rows of several kinds, each with the columns of all."""
-    columns = dict.fromkeys(name for row in rows for name in row)
-    return [{name: row.get(name) for name in columns} for row in rows]
+def with_all_columns(rows: Sequence[Mapping[str, Any]], left_out: Mapping[str, str] = MappingProxyType({})) -> list[dict[str, Any]]:
+    """Rows of several kinds, each with the columns of all; and one for each engine that is left out, with the reason."""
+    every = [*rows, *({"row": "left out", "engine": engine, "reason": why} for engine, why in left_out.items())]
+    columns = dict.fromkeys(name for row in every for name in row)
+    return [{name: row.get(name) for name in columns} for row in every]

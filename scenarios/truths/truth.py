@@ -71,7 +71,7 @@ class Truth:
 
     @property
     def word(self) -> str:
-        """What it is, in words."""
+        """`exact solution` or `recording`, for texts."""
         return EXACT if self.is_exact else RECORDED
 
     def covers(self, t: Array) -> NDArray[np.bool_]:

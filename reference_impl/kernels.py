@@ -1,7 +1,8 @@
 """Compiled loops over `step.advance`, one for each choice of methods and parts, cached on disk.
 
 numba invalidates its cache by the file of the compiled function alone, so an edit elsewhere in this package would leave stale kernels in
-use. The cache is therefore a folder named after a hash of everything that goes into the kernels.
+use. The cache is therefore a folder named after a hash of everything that goes into the kernels. Functions of one name share one index,
+in which two processes that compile different kernels at the same time may store one as the other: each kernel has a name of its own.
 """
 
 import hashlib
@@ -66,6 +67,7 @@ def recording_kernel(methods: Methods, parts: Parts) -> Callable[..., int]:
     floor_of = (read_floor_with_edges if parts.edges else read_floor) if parts.floor else read_nothing
     turn = ROTATIONS[methods.rotation].turn if parts.turning else None
     touches = parts.floor or parts.walls > 0  # otherwise methods that differ in contacts alone have one kernel
+    used = parts.turning and methods.rotation, touches and (methods.contact, methods.law), parts
     law = LAWS[methods.law].impulse if touches else None
     collide = COLLIDE[methods.contact][methods.law] if touches else None
     walls_of, wall_count = _walls_of if parts.walls else _no_walls, parts.walls
@@ -97,6 +99,7 @@ def recording_kernel(methods: Methods, parts: Parts) -> Callable[..., int]:
                 _record(recorded[number, row], x, q, v, w)
         return unsolved
 
+    fill.__qualname__ = f"fill-{hashlib.sha256(repr(used).encode()).hexdigest()[:16]}"
     return compile_cached(fill)
 
 
@@ -134,7 +137,7 @@ def compile_cached(function: Callable[..., Any], *other_sources: Path) -> Callab
     """Compile a kernel with IEEE rules (1/0 is inf), without reassociation and without Python's lock; cache it if the disk allows.
 
     Args:
-        function: The kernel.
+        function: The kernel. No other one has its qualified name.
         other_sources: The files outside this package that it consists of.
     """
     with _cache_folder(other_sources) as writable:

@@ -206,6 +206,28 @@ def test_source_edited_after_the_import_is_compiled_anew(package, fall):
     assert fall(package)[:2] == ["-2.0", "0"]
 
 
+def test_kernels_compiled_at_the_same_time_are_not_stored_as_each_other(package, fall):
+    """Two processes read the index before either wrote it; the one that wrote its entry last writes its kernel first."""
+    program = (
+        "import numpy as np, numba.core.caching\nimport dropspin.reference_impl as r\n"
+        "from dropspin.reference_impl.kernels import recording_kernel\n"
+        "body = r.Body(1.0, np.diag([1.0, 2.0, 3.0]), np.zeros((1, 3)))\n"
+        "start = np.array([0, 9, 0, 0, 0, 0, 1, 0, 0, 0, 1, 2, 3.])\n"
+        "def spin(rotation):\n"
+        "    return r.simulate(start, body, r.World(), 0.5, 1, methods=r.Methods(rotation=rotation))[-1, 10]\n"
+    )
+    both_at_once = (
+        "cache, late = numba.core.caching.IndexDataCacheFile, []\n"
+        "cache._load_index, save = lambda self: {}, cache._save_data\n"
+        "cache._save_data = lambda *arguments: late.insert(0, arguments)\n"
+        "print(spin('note'), spin('exact'))\n"
+        "for arguments in late: save(*arguments)\n"
+    )
+    known = fall(package, program + both_at_once)
+    assert known[0] == "1.0" != known[1]
+    assert fall(package, program + "print(spin('note'), spin('exact'))") == known
+
+
 def test_user_s_cache_setting_survives_first_use_in_many_threads():
     """Kernels declared at once by several threads leave numba's setting unchanged."""
     program = (

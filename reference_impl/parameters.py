@@ -53,7 +53,7 @@ def pack(body: Body, world: World, dt: float | Array) -> Parameters:
         in_order += [np.array([from_matrix(_matrix(frame)) for frame in frames])]
         in_order += [np.sum(given[f"{name}normal"] * given[f"{name}point"], axis=1)]
     columns = np.concatenate([np.broadcast_to(part.reshape(len(part), -1), (size, part[0].size)) for part in in_order], axis=1)
-    return Parameters(columns, points, is_ensemble)
+    return Parameters(np.ascontiguousarray(columns), points, is_ensemble)
 
 
 def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[ArrayLike, tuple[int, ...], str, Test]]:

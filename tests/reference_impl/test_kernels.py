@@ -103,6 +103,16 @@ def test_vertices_in_blocks_collide_as_one_after_the_other(monkeypatch):
         np.testing.assert_array_equal(reference_impl.simulate(start, body, world, 5e-3, 300), expected)
 
 
+def test_one_body_and_ensembles_are_one_kernel_in_the_cache():
+    """All arrays have one memory layout: otherwise a kernel would be stored once for each, under the same name."""
+    starts = np.asfortranarray(np.tile([0, 9, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.0], (3, 1)))
+    world = World(np.array([0, -1, 0]))
+    for states, dt in ((starts[0], 0.1), (starts, 0.1), (starts, np.array([0.1, 0.2, 0.3]))):
+        reference_impl.simulate(states, Body(1.0, np.eye(3), np.zeros((1, 3)), (0.1, 0.1, 0.1)), world, dt, 1)
+    kernel = recording_kernel(Methods(), reference_impl.kernels.Parts(True, False, False, False, False))
+    assert len(kernel.signatures) == 1
+
+
 def in_a_process(program, **environment):
     """What a program prints in a process with its own settings of numba."""
     program = f"import sys\nsys.path.insert(0, {str(Path(__file__).parent)!r})\n{program}"

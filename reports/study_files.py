@@ -103,7 +103,7 @@ def read_study(folder: str) -> Document:
     except (OSError, ValueError, ArithmeticError, LookupError, StopIteration) as error:
         raise DropspinError(
             f"{folder}: has no study, or a damaged one ({SECTION}: {_detail(error)}); "
-            "give a folder that dropspin tradeoff, limits, symmetries or reproduce wrote."
+            "give a folder that dropspin diagnose, limits, log, reproduce, symmetries or tradeoff wrote with -o."
         ) from None
     return document
 

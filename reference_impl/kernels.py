@@ -2,7 +2,8 @@
 
 numba invalidates its cache by the file of the compiled function alone, so an edit elsewhere in this package would leave stale kernels in
 use. The cache is therefore a folder named after a hash of everything that goes into the kernels. Functions of one name share one index,
-in which two processes that compile different kernels at the same time may store one as the other: each kernel has a name of its own.
+in which two processes that compile different kernels at the same time may store one as the other: each kernel has a name of its own, and
+each type of processor a folder.
 """
 
 import hashlib
@@ -18,6 +19,7 @@ from typing import Any
 
 import llvmlite
 import numba
+from llvmlite.binding import get_host_cpu_name
 from numba import njit
 from numba.core import config as numba_config
 
@@ -175,8 +177,8 @@ def _make_room(folder: Path) -> None:
 
 
 def _fingerprint(other_sources: tuple[Path, ...]) -> str:
-    """A hash of all source files, of the compilers' versions, and of the settings that change what they compile."""
-    digest = hashlib.sha256(f"{sources.HASH} {numba.__version__} {llvmlite.__version__}".encode())
+    """A hash of all source files, of the compilers' versions, of the processor, and of the settings that change what they compile."""
+    digest = hashlib.sha256(f"{sources.HASH} {numba.__version__} {llvmlite.__version__} {get_host_cpu_name()}".encode())
     for source in other_sources:
         digest.update(source.read_bytes())
     for name in COMPILER_SETTINGS:

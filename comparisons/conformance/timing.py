@@ -122,7 +122,7 @@ def _by_velocity(scene: Scenario, rows: Array) -> Array:
 
 
 def check_velocity_lag(engine: Engine) -> str:
-    """`velocity_lag` is the time by which velocity lags position: how much faster a falling body moves than its velocity says, over g."""
+    """`velocity_lag` is the time by which velocity lags position, from the displacement and the velocity of a falling body."""
     measured, stated, ahead, noise = _fall(engine)
     if noise > LAG_TOLERANCE:
         raise Noted(f"a fall does not lag by the same time throughout, but by {noise:.2g} steps more or less")
@@ -131,10 +131,10 @@ def check_velocity_lag(engine: Engine) -> str:
     explicit = f"{EXPLICIT_EULER}; " if abs(measured + 0.5) <= LAG_TOLERANCE else ""
     if abs(measured - stated) > LAG_TOLERANCE:
         raise CheckFailed(
-            f"{explicit}velocity_lag is {stated:.3g} steps, but velocity lags position by {measured:.3g} steps, by how much faster a "
-            f"falling body moves than its velocity says; {_suggested_lag(measured)}"
+            f"{explicit}velocity_lag is {stated:.3g} steps, but velocity lags position by {measured:.3g} steps, from the "
+            f"displacement of a falling body; {_suggested_lag(measured)}"
         )
-    if min(abs(ahead), abs(ahead - measured)) > LAG_TOLERANCE:  # one that lags is ahead by its lag, or not, as a leapfrog
+    if min(abs(ahead), abs(ahead - measured)) > LAG_TOLERANCE:  # a lagging velocity is ahead by its lag, or not at all, as in a leapfrog scheme
         raise CheckFailed(f"a fall runs ahead of the exact one by {ahead:.3g} steps; {NO_SCHEME}")
     if explicit:
         raise Noted(EXPLICIT_EULER)

@@ -31,6 +31,12 @@ def version(package: str) -> str:
     return described["version"]
 
 
+def install_extra(name: str) -> str:
+    """The command that installs the packages of an extra of dropspin, which need not be on an index itself."""
+    parts = [text.split("; extra == ") for text in metadata.requires("dropspin") or ()]
+    return " ".join(["pip install", *(f"'{package}'" for package, *extra in parts if extra == [f"'{name}'"])])
+
+
 def numbers_of(text: str) -> Version:
     """The first three numbers of a version string; a suffix such as .dev1 comes after them."""
     return tuple(map(int, re.findall(r"\d+", text)[:3]))

@@ -13,14 +13,17 @@ from typing import NamedTuple
 
 from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissing
 from dropspin.comparisons.engines.exceptions import described
-from dropspin.comparisons.engines.packages import CANNON_ES, HAVOK, JOLT, RAPIER_JS, is_npm, npm_package
+from dropspin.comparisons.engines.packages import CANNON_ES, HAVOK, JOLT, RAPIER_JS, install_extra, is_npm, npm_package
 from dropspin.scenarios.errors import DropspinError, UnknownName
 from dropspin.scenarios.model import EARLIER_NAMES
 from dropspin.scenarios.validation import shown
 
 
 class _Home(NamedTuple):
-    """The module and class of an engine's adapter, the package that it needs, the command that installs it, and more about that."""
+    """The module and class of an engine's adapter, the package that it needs, the command that installs it, and more about that.
+
+    Without a command, the extra of dropspin that has the engine's name installs it.
+    """
 
     module: str
     adapter: str
@@ -33,10 +36,11 @@ GROUP = "dropspin.engines"
 """The entry-point group in which other packages register engines: name = "module:Class"."""
 FOLDER = "dropspin.comparisons.engines"
 WHEELS = " (it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere it needs a compiler)"
+NO_NODE = "it runs in Node.js, and there is no node on PATH"
 WHERE = ", in the working folder or a folder above it"
 LIBRARY = ", and ODE's library (Debian, Ubuntu: apt-get install libode8)"
 BUILT_IN = {"wang": _Home(f"{FOLDER}.wang", "Wang")} | {
-    name: _Home(f"{FOLDER}.{name.replace('-', '_')}_engine", adapter, package, *command or [f"pip install 'dropspin[{name}]'"])
+    name: _Home(f"{FOLDER}.{name.replace('-', '_')}_engine", adapter, package, *command)
     for name, adapter, package, *command in (
         ("mujoco", "MuJoCo", "mujoco", "pip install mujoco"),
         ("pybullet", "PyBullet", "pybullet", "pip install pybullet", WHEELS),
@@ -48,7 +52,7 @@ BUILT_IN = {"wang": _Home(f"{FOLDER}.wang", "Wang")} | {
         ("dart", "Dart", "dartpy"),
         ("drake", "Drake", "pydrake"),
         ("box3d", "Box3D", "robox3d"),
-        ("ode", "ODE", "odepy", "pip install 'dropspin[ode]'", LIBRARY),
+        ("ode", "ODE", "odepy", "", LIBRARY),
         ("sapien", "Sapien", "sapien"),
         ("exudyn", "Exudyn", "exudyn"),
         ("jsbsim", "JSBSim", "jsbsim"),
@@ -130,7 +134,7 @@ def _adapter(base: str) -> type[Engine]:
         home = BUILT_IN[base]
         # Checked before the import of the adapter, which imports its engine.
         if absent := absence(base):
-            raise EngineMissing(f"{base} is not installed: {absent}{home.note if absent == home.command else ''}.")
+            raise EngineMissing(f"{base} is not installed: {absent}{'' if absent == NO_NODE else home.note}.")
         try:
             return getattr(import_module(home.module), home.adapter)
         except (Exception, SystemExit) as error:
@@ -150,9 +154,9 @@ def absence(base: str) -> str:
     """What a built-in engine lacks, or the command that installs it; empty if it is installed, and for other engines."""
     home = BUILT_IN.get(base, _Home("", ""))
     if not is_npm(home.package):
-        return home.command if home.package and find_spec(home.package) is None else ""
+        return (home.command or install_extra(base)) if home.package and find_spec(home.package) is None else ""
     if which("node") is None:
-        return "it runs in Node.js, and there is no node on PATH"
+        return NO_NODE
     with suppress(PackageNotFoundError):
         npm_package(home.package)
         return ""

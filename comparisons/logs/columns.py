@@ -15,6 +15,7 @@ import pandas as pd
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from dropspin.comparisons.engines.packages import install_extra
 from dropspin.scenarios.errors import DropspinError, did_you_mean
 from dropspin.scenarios.files import read_file
 from dropspin.scenarios.state import Array
@@ -145,7 +146,7 @@ def _mcap(raw: bytes, given: str, topic: str | None) -> Columns:
         from mcap.reader import make_reader
         from zstandard import ZstdError
     except ImportError:
-        raise DropspinError(f"{given}: MCAP files need a package that is not installed: pip install 'dropspin[mcap]'.") from None
+        raise DropspinError(f"{given}: MCAP files need a package that is not installed: {install_extra('mcap')}.") from None
     rows: list[Any] = []
     topics: dict[str, str] = {}
     try:

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from dropspin.comparisons.engines.base import EngineMissing
+from dropspin.comparisons.engines.packages import install_extra
 from dropspin.scenarios import DropspinError
 
 CONNECT_TIMEOUT, WORKER_TIMEOUT = 30.0, 120.0
@@ -29,7 +30,7 @@ def connected(scheduler: str) -> Iterator[Any]:
             f"--scheduler {scheduler}: not a valid address; give the one that dask scheduler prints when it starts, such as tcp://host:8786."
         )
     if find_spec("distributed") is None:
-        raise EngineMissing("--scheduler needs Dask, which is not installed: pip install 'dropspin[cluster]'.")
+        raise EngineMissing(f"--scheduler needs Dask, which is not installed: {install_extra('cluster')}.")
     from distributed import Client, KilledWorker, Security
     from distributed.comm.core import connect
     from distributed.utils import LoopRunner

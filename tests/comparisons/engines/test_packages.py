@@ -70,5 +70,5 @@ def test_list_of_engines_fits_80_columns_and_has_the_command_that_installs_each(
     monkeypatch.setattr(registry, "which", lambda name: name)
     missing = listed()
     assert missing["mujoco"] == ["no", "pip install mujoco"]
-    assert missing["drake"] == ["no", "pip install 'dropspin[drake]'"]
+    assert missing["drake"] == ["no", "pip install 'drake>=1.51'"]
     assert missing["havok"] == ["no", "npm install @babylonjs/havok"]

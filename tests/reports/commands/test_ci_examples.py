@@ -1,6 +1,7 @@
-"""The examples for CI servers in docs/ci, run line by line as the servers do."""
+"""The examples for CI servers in docs/ci, and the action at the root that one of them uses, run step by step as the servers do."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -11,60 +12,108 @@ import yaml
 
 ROOT = Path(__file__).parents[3]
 ENGINE = "my_engine:MyEngine"
+HERE = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+ACTION = yaml.safe_load((ROOT / "action.yml").read_text())
+GITHUB = yaml.safe_load((ROOT / "docs/ci/github.yml").read_text())
+GITLAB = yaml.safe_load((ROOT / "docs/ci/gitlab.yml").read_text())
 
 
 def called(*command, cwd, **environment):
     return subprocess.run(command, cwd=cwd, env=os.environ | environment, capture_output=True, text=True, timeout=900, check=False)
 
 
-def scripts():
-    """The lines that each example has its CI server run."""
-    github = yaml.safe_load((ROOT / "docs/ci/github.yml").read_text())
-    steps = [step["run"] for step in github["jobs"]["accuracy"]["steps"] if "run" in step]
-    gitlab = yaml.safe_load((ROOT / "docs/ci/gitlab.yml").read_text())
-    return {"github": steps, "gitlab": gitlab["accuracy"]["script"]}
+def github_steps(**inputs):
+    """The text and the environment of each step of the action, with the inputs of the example and others."""
+    [used] = [step for step in GITHUB["jobs"]["accuracy"]["steps"] if step["uses"].startswith("OWNER/dropspin@")]
+    values = {name: declared["default"] for name, declared in ACTION["inputs"].items()} | used["with"] | inputs
+    steps = [step for step in ACTION["runs"]["steps"] if "run" in step]
+    return [
+        (step["run"], {name: values[value.removeprefix("${{ inputs.").removesuffix(" }}")] for name, value in step.get("env", {}).items()})
+        for step in steps
+    ]
 
 
-def run_example(lines, folder, release, **environment):
-    """One line after the other, until one fails."""
-    summary = folder / "step-summary.md"
-    given = {"ENGINE": ENGINE, "GITHUB_STEP_SUMMARY": str(summary), "RELEASE": release, "CI": "true"}
-    return called("bash", "-e", "-o", "pipefail", "-c", "\n".join(lines), cwd=folder, **given, **environment)
+def gitlab_steps(line=lambda line: line):
+    return [("\n".join(map(line, GITLAB["accuracy"]["script"])), {"DROPSPIN": str(ROOT), "ENGINE": ENGINE, "CI": "true"})]
+
+
+def run_steps(steps, folder, release, **environment):
+    """One step after the other, each in a shell of its own, until one fails."""
+    files = {name: str(folder / name) for name in ("GITHUB_OUTPUT", "GITHUB_STEP_SUMMARY")}
+    given = {**files, "GITHUB_ACTION_PATH": str(ROOT), "RELEASE": release, **environment}
+    for text, of_step in steps:
+        done = called("bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", text, cwd=folder, **given, **of_step)
+        if done.returncode:
+            break
+    return done
+
+
+def copied(repository, folder):
+    for name in ("my_engine.py", "dropspin-baseline.toml"):
+        shutil.copy(repository / name, folder)
 
 
 def assert_outcome(release, folder, done, exit_codes, junit_schema):
+    """Returns the summary."""
     assert done.returncode == exit_codes[release], done.stdout + done.stderr
     junit_schema.validate(folder / "out/junit.xml")
-    [summary] = [path for path in (folder / "step-summary.md", folder / "out/summary.md") if path.exists()]
+    [summary] = [path for path in (folder / "GITHUB_STEP_SUMMARY", folder / "out/summary.md") if path.exists()]
     assert summary.read_text().startswith(f"## dropspin: {'✓' if release == 'good' else '✗'}")
+    return summary.read_text()
 
 
-@pytest.mark.parametrize("server", ["github", pytest.param("gitlab", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("release", ["failing", *(pytest.param(release, marks=pytest.mark.slow) for release in ("good", "crashing"))])
-def test_an_example_judges_a_good_a_failing_and_a_crashing_engine(server, release, repository, exit_codes, junit_schema, tmp_path):
-    """By the example's own lines, with one scene and one time step, and what is installed here."""
-    for name in ("my_engine.py", "dropspin-baseline.toml"):
-        shutil.copy(repository / name, tmp_path)
-    install, *lines = scripts()[server]
-    assert install == "pip install dropspin"
-    lines = [line.replace("dropspin run", "dropspin run drop-ball --dt 0.004") for line in lines]
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    assert_outcome(release, tmp_path, run_example(lines, tmp_path, release, PATH=path), exit_codes, junit_schema)
+def test_action_judges_an_engine_and_names_the_cause_of_a_regression(release, repository, exit_codes, junit_schema, tmp_path):
+    """With one scene, and what is installed here."""
+    copied(repository, tmp_path)
+    _, *steps = github_steps(engines=f"{ENGINE}\n", scenes="drop-ball\n")
+    summary = assert_outcome(release, tmp_path, run_steps(steps, tmp_path, release, PATH=HERE), exit_codes, junit_schema)
+    assert ("restitution 1 % too high" in summary) == (release == "failing")
+    outputs = dict(line.split("=") for line in (tmp_path / "GITHUB_OUTPUT").read_text().splitlines())
+    assert outputs.keys() == ACTION["outputs"].keys()
+    assert all((tmp_path / path).is_file() for path in outputs.values())
+
+
+def test_texts_of_inputs_are_no_commands(tmp_path):
+    planted = "$(touch planted)`touch planted`'; touch planted; \""
+    _, measure, _ = github_steps(engines=planted, scenes=planted, **{"time-steps": planted}, output=f"out{planted}")
+    done = run_steps([measure], tmp_path, "good", PATH=HERE)
+    assert done.returncode == 1
+    assert "is not a valid float" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+    assert not any("${{" in step["run"] for step in ACTION["runs"]["steps"] if "run" in step)
+
+
+def test_actions_of_others_are_named_by_their_commits():
+    texts = [path.read_text() for path in (ROOT / "action.yml", *(ROOT / "docs/ci").glob("*.yml"))]
+    used = {name for text in texts for name in re.findall(r"uses: (\S+)", text)} - {"OWNER/dropspin@COMMIT"}
+    assert used
+    assert all(re.fullmatch(r"[\w/-]+@[0-9a-f]{40}", name) for name in used)
 
 
 @pytest.mark.slow
-def test_an_example_works_on_a_clean_machine(repository, exit_codes, junit_schema, tmp_path):
-    """Word by word: installed from nothing, first measured and accepted as the comments say, then all three releases of the engine."""
-    built = called(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(tmp_path / "wheels"), str(ROOT), cwd=tmp_path)
-    assert built.returncode == 0, built.stderr
+@pytest.mark.parametrize("release", ["good", "failing", "crashing"])
+def test_gitlab_example_judges_an_engine(release, repository, exit_codes, junit_schema, tmp_path):
+    """With one scene and one time step, and what is installed here."""
+    copied(repository, tmp_path)
+
+    def line(text):
+        return text.replace("dropspin run", "dropspin run drop-ball --dt 0.004").replace("pip install", "test -d")
+
+    assert_outcome(release, tmp_path, run_steps(gitlab_steps(line), tmp_path, release, PATH=HERE), exit_codes, junit_schema)
+
+
+@pytest.mark.slow
+def test_action_works_on_a_clean_machine(repository, exit_codes, junit_schema, tmp_path):
+    """Installed from nothing, first measured and accepted as the example's comment says, then all three releases of the engine."""
     subprocess.run([sys.executable, "-m", "venv", tmp_path / "clean"], check=True)
-    clean = {"PATH": f"{tmp_path / 'clean/bin'}{os.pathsep}/usr/bin{os.pathsep}/bin", "PIP_FIND_LINKS": str(tmp_path / "wheels")}
+    clean = {"PATH": f"{tmp_path / 'clean/bin'}{os.pathsep}/usr/bin{os.pathsep}/bin"}
     folder = tmp_path / "repository"
     folder.mkdir()
     shutil.copy(repository / "my_engine.py", folder)
-    lines = scripts()["github"]
-    first = [lines[0], f"dropspin run -e {ENGINE} -o out/run", "dropspin accept out/run --reason 'first measured'"]
-    assert run_example(first, folder, "good", **clean).returncode == 0
+    steps = github_steps(engines=ENGINE, scenes="drop-ball")
+    first = f"dropspin run drop-ball -e {ENGINE} -o out/run; dropspin accept out/run --reason 'first measured'"
+    assert run_steps([steps[0], (first, {})], folder, "good", **clean).returncode == 0
     for release in exit_codes:
-        (folder / "step-summary.md").unlink(missing_ok=True)
-        assert_outcome(release, folder, run_example(lines, folder, release, **clean), exit_codes, junit_schema)
+        (folder / "GITHUB_STEP_SUMMARY").unlink(missing_ok=True)
+        assert_outcome(release, folder, run_steps(steps, folder, release, **clean), exit_codes, junit_schema)

@@ -108,8 +108,8 @@ def __getattr__(name: str) -> Any:
     if name not in _LOCATIONS:
         raise AttributeError(f"module 'dropspin' has no attribute {name!r}")
     module, home = _LOCATIONS[name]
-    globals()[name] = found = getattr(__import__(module, fromlist=(home,)), home)  # as `from module import home`
-    return found
+    globals()[name] = value = getattr(__import__(module, fromlist=(home,)), home)  # as `from module import home`
+    return value
 
 
 def __dir__() -> list[str]:
@@ -132,5 +132,5 @@ def main() -> None:
 def _arrange_path() -> None:
     home, here = os.path.dirname(os.path.dirname(os.path.abspath(__file__))), os.getcwd()
     named = [os.path.abspath(place) for place in os.environ.get("PYTHONPATH", "").split(os.pathsep) if place]
-    own = [place for place in sys.path if os.path.abspath(place) not in {*named, here} - {home}]
-    sys.path[:] = own + [place for place in dict.fromkeys(named) if place not in {home, here}]
+    others = [place for place in sys.path if os.path.abspath(place) not in {*named, here} - {home}]
+    sys.path[:] = others + [place for place in dict.fromkeys(named) if place not in {home, here}]

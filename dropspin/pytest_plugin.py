@@ -79,16 +79,16 @@ class Result:
         labels = {engine, *(label for label, name in self.engines.items() if name == engine)}
         of_engine = [row for row in self.rows if engine is None or row["engine"] in labels]
         measured = [row for row in of_engine if row["kind"] in ("truth", "invariant", "ensemble")]
-        found = [row for row in measured if row["metric"] == metric and (dt is None or math.isclose(row["dt"], dt, rel_tol=1e-9))]
-        if not found:
-            what = f"{metric} of {engine or self.scene} at {'any time step' if dt is None else f'{dt:g} s'}"
+        rows = [row for row in measured if row["metric"] == metric and (dt is None or math.isclose(row["dt"], dt, rel_tol=1e-9))]
+        if not rows:
+            wanted = f"{metric} of {engine or self.scene} at {'any time step' if dt is None else f'{dt:g} s'}"
             available = ", ".join(dict.fromkeys(row["metric"] for row in measured)) or "no metric"
             stopped = "".join(f"; {row['engine']} {row['verdict']}: {row['reason']}" for row in self.rows if row["verdict"] in STOPPED)
-            raise LookupError(f"{what} was not measured; available: {available}{stopped}")
-        engines = list(dict.fromkeys(row["engine"] for row in found))
+            raise LookupError(f"{wanted} was not measured; available: {available}{stopped}")
+        engines = list(dict.fromkeys(row["engine"] for row in rows))
         if len(engines) > 1:
             raise LookupError(f"{metric} was measured for several engines, {', '.join(engines)}; choose one with engine=")
-        value = min(found, key=lambda row: row["dt"])["value"]
+        value = min(rows, key=lambda row: row["dt"])["value"]
         return math.nan if value is None else float(value)
 
 
@@ -104,17 +104,17 @@ class Runs:
         for dt in self.dts:
             if not 0.0 < dt < math.inf:
                 raise pytest.UsageError(f"--dropspin-dt: got {dt:g}; a time step is a positive number of seconds.")
-        given = config.getoption("dropspin_baseline")
-        self.baseline: str | None = self._readable(given) if given else config.getini("dropspin_baseline") or None
+        baseline = config.getoption("dropspin_baseline")
+        self.baseline: str | None = self._readable(baseline) if baseline else config.getini("dropspin_baseline") or None
         self._results: dict[str, Result] = {}
 
-    def _readable(self, given: str) -> str:
+    def _readable(self, name: str) -> str:
         """A file given on the command line, as a path relative to the root directory, in which dropspin is started."""
-        path = self.config.invocation_params.dir / given
+        path = self.config.invocation_params.dir / name
         try:
             path.open("rb").close()
         except OSError as error:
-            raise pytest.UsageError(f"--dropspin-baseline: {given}: {error.strerror}.") from None
+            raise pytest.UsageError(f"--dropspin-baseline: {name}: {error.strerror}.") from None
         return os.path.relpath(path, self.root)
 
     @property
@@ -141,18 +141,18 @@ class Runs:
         with FileLock(self.folder / f"{name}.lock"):
             if isinstance(scene, Mapping):
                 scene = _written(self.folder / f"{name}-scene", scene)
-            given = os.path.relpath(scene, self.root) if os.path.isabs(scene) else os.fspath(scene)
-            found = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
-            if found.get("session") != self.session:
-                done = self.dropspin("run", given, *options, "-o", os.path.relpath(folder, self.root), "--json")
-                found = {"session": self.session, "rows": json.loads(done.stdout or "[]"), "error": _error(done)}
+            target = os.path.relpath(scene, self.root) if os.path.isabs(scene) else os.fspath(scene)
+            stored = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+            if stored.get("session") != self.session:
+                done = self.dropspin("run", target, *options, "-o", os.path.relpath(folder, self.root), "--json")
+                stored = {"session": self.session, "rows": json.loads(done.stdout or "[]"), "error": _error(done)}
                 unfinished = kept.with_suffix(".unfinished")
-                unfinished.write_text(json.dumps(found), encoding="utf-8")
+                unfinished.write_text(json.dumps(stored), encoding="utf-8")
                 unfinished.replace(kept)
-        if not found["rows"]:
-            pytest.fail(found["error"], pytrace=False)
+        if not stored["rows"]:
+            pytest.fail(stored["error"], pytrace=False)
         names = json.loads((folder / "run.json").read_text(encoding="utf-8"))["provenance"]["names"]
-        self._results[name] = Result(found["rows"][0]["scene"], found["rows"], folder, given, names, tuple(dts))
+        self._results[name] = Result(stored["rows"][0]["scene"], stored["rows"], folder, target, names, tuple(dts))
         return self._results[name]
 
     def dropspin(self, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -291,8 +291,8 @@ def _arguments(*scenes: Scene, engine: str | Sequence[str] | None = None, dt: fl
     return scenes, engine, dt
 
 
-def _several(given: Any) -> Any:
-    return [given] if isinstance(given, str | float | int) else given
+def _several(value: Any) -> Any:
+    return [value] if isinstance(value, str | float | int) else value
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -304,9 +304,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     ids, cases = [], []
     for mark in metafunc.definition.iter_markers(NAME):
         scenes, engine, dt = _arguments(*mark.args, **mark.kwargs)
-        for scene, one in product(scenes, _several(engine) or metafunc.config.stash[RUNS].engines or [None]):
-            ids.append("-".join(filter(None, [_title(scene), one])))
-            cases.append((scene, _several(one), _several(dt)))
+        for scene, name in product(scenes, _several(engine) or metafunc.config.stash[RUNS].engines or [None]):
+            ids.append("-".join(filter(None, [_title(scene), name])))
+            cases.append((scene, _several(name), _several(dt)))
     if cases:
         metafunc.parametrize("dropspin_result", cases, ids=ids, indirect=True)
 
@@ -341,15 +341,15 @@ def dropspin_model(pytestconfig: pytest.Config, tmp_path: Path) -> Callable[...,
 
     def diagnose(file: str | os.PathLike[str], *options: str, allowed: Iterable[str] = ()) -> list[Row]:
         __tracebackhide__ = True
-        runs, given = pytestconfig.stash[RUNS], [os.fspath(file), *options]
-        done = runs.dropspin("diagnose", *given, "-o", str(tmp_path / "diagnosis"), "--json")
+        runs, command = pytestconfig.stash[RUNS], [os.fspath(file), *options]
+        done = runs.dropspin("diagnose", *command, "-o", str(tmp_path / "diagnosis"), "--json")
         if done.returncode not in (0, 1):
             pytest.fail(_error(done), pytrace=False)
         rows: list[Row] = json.loads(done.stdout)
-        found = [row for row in rows if row["finding"] and row["question"] not in set(allowed)]
-        if found:
-            lines = [f"{row['body']}, {row['finding']}: {row['question']}, {row['quantity']}: {row['settings']}" for row in found]
-            pytest.fail("\n".join([*lines, f"Reproduce: {shlex.join([NAME, 'diagnose', *given])}"]), pytrace=False)
+        findings = [row for row in rows if row["finding"] and row["question"] not in set(allowed)]
+        if findings:
+            lines = [f"{row['body']}, {row['finding']}: {row['question']}, {row['quantity']}: {row['settings']}" for row in findings]
+            pytest.fail("\n".join([*lines, f"Reproduce: {shlex.join([NAME, 'diagnose', *command])}"]), pytrace=False)
         return rows
 
     return diagnose
@@ -388,8 +388,8 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     if not judged:
         return
     lines = [("engine", "scene", "passed", "failed", "known", "message")]
-    for (engine, scene), found in judged.items():
-        rows = found.values()
+    for (engine, scene), by_key in judged.items():
+        rows = by_key.values()
         tally = (sum(row[key] == value for row in rows) for key, value in (("verdict", "passed"), ("fails", True), ("verdict", "known")))
         lines.append((engine, scene, *map(str, tally), max(rows, key=itemgetter("fails"))["message"]))
     widths = [max(map(len, column)) for column in list(zip(*lines, strict=True))[:-1]]
@@ -400,6 +400,6 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         ]
         terminalreporter.write_line("  ".join([*padded, message]))
     runs = config.stash[RUNS]
-    if runs.baseline and not any(row["kind"] == "baseline" for found in judged.values() for row in found.values()):
+    if runs.baseline and not any(row["kind"] == "baseline" for by_key in judged.values() for row in by_key.values()):
         terminalreporter.write_line(f"{runs.baseline} has no accepted results of these runs; no results were compared with it.")
     terminalreporter.write_line(f"Reports: {os.path.relpath(runs.folder, runs.root)}/*")

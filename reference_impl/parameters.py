@@ -37,21 +37,21 @@ def pack(body: Body, world: World, dt: float | Array) -> Parameters:
         ValueError: A number is out of range, a shape is wrong, or two arguments are for ensembles of different size.
     """
     quantities = _quantities(body, world, dt)
-    given = {name: checked(name, *quantity) for name, quantity in quantities.items()}
+    arrays = {name: checked(name, *quantity) for name, quantity in quantities.items()}
     is_ensemble = any(np.ndim(values) > len(shape) for values, shape, *_ in quantities.values())
-    size = ensemble_size(given)
-    points = given.pop("points")
+    size = ensemble_size(arrays)
+    points = arrays.pop("points")
     # The margin covers the rounding of R: no vertex may reach the floor before the bounding sphere does.
-    reach = (np.sqrt(np.max(np.sum(points**2, axis=2), axis=1)) + given["semi_axes"].max(axis=1)) * (1.0 + 1e-12)
+    reach = (np.sqrt(np.max(np.sum(points**2, axis=2), axis=1)) + arrays["semi_axes"].max(axis=1)) * (1.0 + 1e-12)
     for rate in ("linear damping", "angular damping"):
-        given[rate] = _decay(given[rate], given["dt"])
-    own = [values for name, values in given.items() if not name.startswith(WALL)]
-    in_order = [*own, np.linalg.inv(given["inertia"]), *_principal(given["inertia"]), reach]
+        arrays[rate] = _decay(arrays[rate], arrays["dt"])
+    of_body = [values for name, values in arrays.items() if not name.startswith(WALL)]
+    in_order = [*of_body, np.linalg.inv(arrays["inertia"]), *_principal(arrays["inertia"]), reach]
     for name in _walls(world):
-        frames = _frames(given[f"{name}normal"])
-        in_order += [given[f"{name}restitution"], given[f"{name}friction"], given[f"{name}rest_speed"], frames]
+        frames = _frames(arrays[f"{name}normal"])
+        in_order += [arrays[f"{name}restitution"], arrays[f"{name}friction"], arrays[f"{name}rest_speed"], frames]
         in_order += [np.array([from_matrix(_matrix(frame)) for frame in frames])]
-        in_order += [np.sum(given[f"{name}normal"] * given[f"{name}point"], axis=1)]
+        in_order += [np.sum(arrays[f"{name}normal"] * arrays[f"{name}point"], axis=1)]
     columns = np.concatenate([np.broadcast_to(part.reshape(len(part), -1), (size, part[0].size)) for part in in_order], axis=1)
     return Parameters(np.ascontiguousarray(columns), points, is_ensemble)
 
@@ -152,13 +152,13 @@ def checked(name: str, values: ArrayLike, shape: tuple[int, ...], allowed: str, 
     Raises:
         ValueError: The shape or a value is not allowed; in an ensemble the text names the body.
     """
-    given = _numbers(name, values, allowed)
-    array = given[np.newaxis] if given.ndim == len(shape) else given
+    numbers = _numbers(name, values, allowed)
+    array = numbers[np.newaxis] if numbers.ndim == len(shape) else numbers
     if array.shape[1:] != shape or len(array) == 0:
-        raise ValueError(f"{name}: must have shape {shape} or {('B', *shape)}, got {given.shape}".replace("'", ""))
+        raise ValueError(f"{name}: must have shape {shape} or {('B', *shape)}, got {numbers.shape}".replace("'", ""))
     wrong = np.flatnonzero(~holds(array))
     if len(wrong):
-        whose = f" for body {wrong[0]}" if given.ndim > len(shape) else ""
+        whose = f" for body {wrong[0]}" if numbers.ndim > len(shape) else ""
         raise ValueError(f"{name}: got {array[wrong[0]].tolist()}{whose}; must be {allowed}")
     return array
 
@@ -166,12 +166,12 @@ def checked(name: str, values: ArrayLike, shape: tuple[int, ...], allowed: str, 
 def _numbers(name: str, values: ArrayLike, allowed: str) -> Array:
     """A copy of the argument, so that later changes to the caller's array have no effect."""
     try:
-        given = np.asarray(values)
+        array = np.asarray(values)
     except ValueError:  # rows of different length
-        given = np.asarray(None)
-    if given.dtype.kind not in "iuf":
+        array = np.asarray(None)
+    if array.dtype.kind not in "iuf":
         raise ValueError(f"{name}: got {values!r}; must be {allowed}")
-    return np.array(given, dtype=float, order="C")
+    return np.array(array, dtype=float, order="C")
 
 
 def ensemble_size(quantities: Mapping[str, Array]) -> int:
@@ -195,8 +195,8 @@ def _decay(rates: Array, step_sizes: Array) -> Array:
 def _principal(inertia: Array) -> tuple[Array, Array]:
     """Principal moments, shape (B, 3), the most different one last, and rotations from their frames to the bodies', shape (B, 4)."""
     different, which = np.unique(inertia.reshape(-1, 9), axis=0, return_inverse=True)
-    found = [_principal_of_one(matrix.reshape(3, 3)) for matrix in different]
-    return np.array([moments for moments, _ in found])[which], np.array([axes for _, axes in found])[which]
+    pairs = [_principal_of_one(matrix.reshape(3, 3)) for matrix in different]
+    return np.array([moments for moments, _ in pairs])[which], np.array([axes for _, axes in pairs])[which]
 
 
 def _principal_of_one(inertia: Array) -> tuple[Array, Quat]:

@@ -128,8 +128,8 @@ class Simulator:
         on_vertices = None if forces is None else checked("forces", forces, points.shape[1:], "finite numbers, in N", is_finite)
         steps, every = _whole("steps", steps, 0), _whole("every", every, 1)
         threads = None if threads is None else _whole("threads", threads, 1)
-        given = {"state": starts, "body, world and dt": columns} | ({} if on_vertices is None else {"forces": on_vertices})
-        size = ensemble_size(given)
+        inputs = {"state": starts, "body, world and dt": columns} | ({} if on_vertices is None else {"forces": on_vertices})
+        size = ensemble_size(inputs)
         starts = _with_unit_orientation(starts)
         if len(starts) < size:
             starts = np.tile(starts, (size, 1))

@@ -26,13 +26,13 @@ class Damping(Table):
 
     @model_validator(mode="after")
     def _factors_give_rates(self) -> Self:
-        given = {name: factor for name in MOTIONS if (factor := getattr(self, f"{name}_factor")) is not None}
+        factors = {name: factor for name in MOTIONS if (factor := getattr(self, f"{name}_factor")) is not None}
         step = self.factor_dt
-        if given and step is None:
+        if factors and step is None:
             raise ValueError("a factor needs factor_dt, the time step that it is meant at, in s")
-        if given and self.model_fields_set & {*MOTIONS}:
+        if factors and self.model_fields_set & {*MOTIONS}:
             raise ValueError("has rates (linear, angular) and factors (linear_factor, angular_factor); give one kind")
-        for name, factor in given.items():
+        for name, factor in factors.items():
             assert step is not None
             object.__setattr__(self, name, -math.log(factor) / step)
             object.__setattr__(self, f"{name}_factor", None)

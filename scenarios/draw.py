@@ -76,9 +76,9 @@ def draw(count: int, seed: int) -> list[Scenario]:
     Raises:
         DropspinError: Count or seed are out of range.
     """
-    for name, given, least, most in (("count", count, 1, MOST_SCENES), ("seed", seed, 0, LARGEST_SEED)):
-        if isinstance(given, bool) or not isinstance(given, int) or not least <= given <= most:
-            raise DropspinError(f"{name}: got {given!r}; give a whole number from {least} to {most}.")
+    for name, number, least, most in (("count", count, 1, MOST_SCENES), ("seed", seed, 0, LARGEST_SEED)):
+        if isinstance(number, bool) or not isinstance(number, int) or not least <= number <= most:
+            raise DropspinError(f"{name}: got {number!r}; give a whole number from {least} to {most}.")
     return [drawn_scene(seed, _number(place)) for place in range(count)]
 
 
@@ -107,9 +107,9 @@ def drawn_scene(seed: int, number: int) -> Scenario:
     for _ in range(MOST_DRAWS):
         content, last_impact = draw_content(draws)
         scene = Scenario.model_validate({"name": name, "origin": name, "summary": summary, "tags": ["drawn", family], **content})
-        found = scene if last_impact is None else _ended(scene, last_impact, draws.uniform(0.5, 0.8))
-        if found is not None and _is_resolved(found):
-            return found
+        drawn = scene if last_impact is None else _ended(scene, last_impact, draws.uniform(0.5, 0.8))
+        if drawn is not None and _is_resolved(drawn):
+            return drawn
     raise AssertionError(f"no scene of the family {family} was accepted in {MOST_DRAWS} draws")
 
 

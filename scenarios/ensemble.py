@@ -75,16 +75,16 @@ def spread_starts(states: Array, spread: Ensemble, numbers: NDArray[np.int64], v
         floor: Whether there is a floor; if so, each initial state has the clearance of its scene.
     """
     height, around, share, *sideways = (uniform(spread.seed, name, numbers) for name in ("axis height", "axis angle", "share", *RATE_DRAWS))
-    found = states.copy()
-    found[:, RATES] += (2.0 * np.stack(sideways, axis=1) - 1.0) * np.array([*spread.velocity, *spread.angular_velocity])
+    starts = states.copy()
+    starts[:, RATES] += (2.0 * np.stack(sideways, axis=1) - 1.0) * np.array([*spread.velocity, *spread.angular_velocity])
     if spread.turn > 0.0:
         # By `math`, because the last bit of NumPy's functions may depend on the length of the array.
         draws = zip(height.tolist(), around.tolist(), _angles(share, spread.turn).tolist(), strict=True)
         turns = np.array([_turn(*draw) for draw in draws])
-        found[:, ORIENTATION] = [unit(tuple(q)) for q in multiply(turns, states[:, ORIENTATION]).tolist()]
+        starts[:, ORIENTATION] = [unit(tuple(q)) for q in multiply(turns, states[:, ORIENTATION]).tolist()]
     if floor:
-        found[:, 1] += clearances(states, vertices, semi_axes) - clearances(found, vertices, semi_axes)
-    return found
+        starts[:, 1] += clearances(states, vertices, semi_axes) - clearances(starts, vertices, semi_axes)
+    return starts
 
 
 def _turn(height: float, around: float, angle: float) -> list[float]:

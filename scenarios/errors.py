@@ -30,24 +30,24 @@ class UnknownName(DropspinError):
         known: All known names; the nearest one is suggested.
     """
 
-    def __init__(self, what: str, given: str, known: Iterable[str]) -> None:
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         known = sorted(known)
-        super().__init__(f"{what} {given!r} is unknown.{did_you_mean(given, known)} Known: {', '.join(known) or 'none'}.")
+        super().__init__(f"{kind} {name!r} is unknown.{did_you_mean(name, known)} Known: {', '.join(known) or 'none'}.")
 
 
-def verify_known(what: str, names: Iterable[str], known: Collection[str]) -> None:
-    """Raise `UnknownName` for the first of some names that is not among the known ones; `what` is the kind of thing that they denote."""
+def verify_known(kind: str, names: Iterable[str], known: Collection[str]) -> None:
+    """Raise `UnknownName` for the first of some names that is not among the known ones; `kind` is the kind of thing that they denote."""
     for name in names:
         if name not in known:
-            raise UnknownName(what, name, known)
+            raise UnknownName(kind, name, known)
 
 
-def did_you_mean(given: str, known: Iterable[str]) -> str:
+def did_you_mean(name: str, known: Iterable[str]) -> str:
     """' Did you mean …?' with the nearest known name, or an empty string."""
-    meant = nearest(given, known)
+    meant = nearest(name, known)
     return f" Did you mean {meant!r}?" if meant else ""
 
 
-def nearest(given: str, known: Iterable[str]) -> str | None:
+def nearest(name: str, known: Iterable[str]) -> str | None:
     """The nearest known name; None if none is near."""
-    return next(iter(difflib.get_close_matches(given, list(known), n=1, cutoff=0.55)), None)
+    return next(iter(difflib.get_close_matches(name, list(known), n=1, cutoff=0.55)), None)

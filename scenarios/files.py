@@ -5,13 +5,13 @@ from pathlib import Path
 from dropspin.scenarios.errors import DropspinError
 
 
-def read_file(path: Path, given: str, what: str, largest: int) -> bytes:
+def read_file(path: Path, name: str, kind: str, largest: int) -> bytes:
     """The content of a regular file. A pipe or a device is refused before it is opened, because reading it might never end.
 
     Args:
         path: The file.
-        given: The path as the user gave it, for messages.
-        what: The word for this kind of file in messages.
+        name: The path as the user gave it, for messages.
+        kind: The word for this kind of file in messages.
         largest: Largest allowed size [bytes].
 
     Raises:
@@ -19,16 +19,16 @@ def read_file(path: Path, given: str, what: str, largest: int) -> bytes:
     """
     try:
         if path.is_dir():
-            raise DropspinError(f"{given}: is a directory; a {what} is one file, so give its path.")
+            raise DropspinError(f"{name}: is a directory; a {kind} is one file, so give its path.")
         path.stat()  # raises the error of an absent file
         if not path.is_file():
-            raise DropspinError(f"{given}: is a pipe or a device; a {what} is a regular file.")
+            raise DropspinError(f"{name}: is a pipe or a device; a {kind} is a regular file.")
         with path.open("rb") as file:
             content = file.read(largest + 1)
     except OSError as error:
-        raise DropspinError(f"{given}: {error.strerror}; give the path of a readable file.") from None
+        raise DropspinError(f"{name}: {error.strerror}; give the path of a readable file.") from None
     except ValueError:
-        raise DropspinError(f"{given!r}: this cannot be the name of a file.") from None
+        raise DropspinError(f"{name!r}: this cannot be the name of a file.") from None
     if len(content) > largest:
-        raise DropspinError(f"{given}: larger than {largest:,} bytes, the limit for a {what}.")
+        raise DropspinError(f"{name}: larger than {largest:,} bytes, the limit for a {kind}.")
     return content

@@ -92,8 +92,8 @@ def with_mesh(content: dict[str, Any], folder: Path) -> dict[str, Any]:
         raise SceneError(f"body.file: got {shown(file)}; must be the path of a file .obj or .stl.")
     if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0.0 < scale <= LARGEST:
         raise SceneError(f"body.scale: got {shown(scale)}; must be a number above 0.")
-    if given := {"points", "faces"} & set(keys):
-        raise SceneError(f"body.{min(given)}: the file of a mesh gives points and faces; give either these or file.")
+    if extra := {"points", "faces"} & set(keys):
+        raise SceneError(f"body.{min(extra)}: the file of a mesh gives points and faces; give either these or file.")
     try:
         points, faces = read_mesh(folder / file, str(folder / file))
     except DropspinError as error:
@@ -138,51 +138,51 @@ def _find(scene: str | Path) -> Path:
     )
 
 
-def read_toml(path: Path, given: str, what: str = "scene", largest: int = MAX_FILE_SIZE) -> dict[str, Any]:
+def read_toml(path: Path, name: str, kind: str = "scene", largest: int = MAX_FILE_SIZE) -> dict[str, Any]:
     """The content of a TOML file.
 
     Args:
         path: The file.
-        given: The path as the user gave it, for messages.
-        what: The word for such a file, for messages.
+        name: The path as the user gave it, for messages.
+        kind: The word for such a file, for messages.
         largest: Largest allowed size [bytes].
 
     Raises:
         SceneError: The path is not a TOML file, or cannot be read.
     """
-    text, remedy = "", f"a {what} is a TOML file in UTF-8"
+    text, remedy = "", f"a {kind} is a TOML file in UTF-8"
     try:
-        raw = read_file(path, given, what, largest)
+        raw = read_file(path, name, kind, largest)
         text = raw.decode("utf-8-sig")
         content = tomllib.loads(text)
     except DropspinError as error:
         raise SceneError(str(error)) from None
     except UnicodeDecodeError as error:
         reason = "is a binary file, which is not UTF-8 text" if b"\0" in raw else f"byte {error.start} is not UTF-8 text"
-        raise SceneError(f"{given}: {reason}; {remedy}.") from None
+        raise SceneError(f"{name}: {reason}; {remedy}.") from None
     except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{given}: not TOML: {error}; {remedy}.") from None
+        raise SceneError(f"{name}: not TOML: {error}; {remedy}.") from None
     except RecursionError:
-        raise SceneError(f"{given}: nested too deeply to be a {what}.") from None
+        raise SceneError(f"{name}: nested too deeply to be a {kind}.") from None
     except ValueError:  # of Python's limit for converting decimal digits
-        raise SceneError(f"{given}: has a whole number {TOO_LARGE}.") from None
-    _verify_sizes(content, given, what)
+        raise SceneError(f"{name}: has a whole number {TOO_LARGE}.") from None
+    _verify_sizes(content, name, kind)
     return content
 
 
 TOO_LARGE = "that exceeds the range of floating-point numbers"
 
 
-def _verify_sizes(content: dict[str, Any], given: str, what: str) -> None:
-    """Raise `SceneError` for what no `what` has and messages could not show: deep nesting, whole numbers of thousands of digits."""
+def _verify_sizes(content: dict[str, Any], name: str, kind: str) -> None:
+    """Raise `SceneError` for what no `kind` has and messages could not show: deep nesting, whole numbers of thousands of digits."""
     level: list[Any] = [content]
     for _ in range(DEEPEST):
-        level = [part for one in level for part in (one.values() if isinstance(one, dict) else one)]
+        level = [part for node in level for part in (node.values() if isinstance(node, dict) else node)]
         if any(type(part) is int and part.bit_length() > sys.float_info.max_exp for part in level):
-            raise SceneError(f"{given}: has a whole number {TOO_LARGE}.")
+            raise SceneError(f"{name}: has a whole number {TOO_LARGE}.")
         level = [part for part in level if isinstance(part, dict | list)]
     if level:
-        raise SceneError(f"{given}: nested too deeply to be a {what}.")
+        raise SceneError(f"{name}: nested too deeply to be a {kind}.")
 
 
 def from_mapping(scene: Mapping[str, Any]) -> Scenario:
@@ -200,8 +200,8 @@ def _without_numpy(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, Mapping):
-        return {key: _without_numpy(one) for key, one in value.items()}
-    return [_without_numpy(one) for one in value] if isinstance(value, list | tuple) else value
+        return {key: _without_numpy(item) for key, item in value.items()}
+    return [_without_numpy(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def from_table(name: str, origin: str, content: dict[str, Any]) -> Scenario:

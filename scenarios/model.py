@@ -133,20 +133,20 @@ class Scenario(Table):
     # Validators rather than the types `Text` and `Prose`, whose functions the signature would show.
     @field_validator("summary", "source", mode="before")
     @classmethod
-    def _is_joined(cls, given: object) -> object:
-        return joined(given)
+    def _is_joined(cls, value: object) -> object:
+        return joined(value)
 
     @field_validator("wall")
     @classmethod
-    def _no_wall_is_none(cls, given: tuple[Wall, ...] | None) -> tuple[Wall, ...] | None:
-        return given or None
+    def _no_wall_is_none(cls, walls: tuple[Wall, ...] | None) -> tuple[Wall, ...] | None:
+        return walls or None
 
     @field_validator("name", "summary", "source", "tags")
     @classmethod
-    def _is_printable(cls, given: str | tuple[str, ...]) -> str | tuple[str, ...]:
-        for text in [given] if isinstance(given, str) else given:
+    def _is_printable(cls, value: str | tuple[str, ...]) -> str | tuple[str, ...]:
+        for text in [value] if isinstance(value, str) else value:
             verify_line(text)
-        return given
+        return value
 
     @model_validator(mode="after")
     def _has_an_inertia(self) -> Self:
@@ -251,17 +251,17 @@ class Scenario(Table):
         """A short hash of everything that affects the motion: without texts, expectations and values that are the default."""
         texts: dict[str, Any] = dict.fromkeys(("name", "summary", "source", "tags", "expect"), True)
         physics = self.model_dump_json(exclude=texts | {"body": set(self.body.arrays), "recording": True}, exclude_defaults=True)
-        found = hashlib.sha256(physics.encode())
+        sha = hashlib.sha256(physics.encode())
         for name in self.body.arrays:
-            found.update(getattr(self.body, name).tobytes())
+            sha.update(getattr(self.body, name).tobytes())
         if self.recording is not None:
-            found.update(self.recording.digest.encode())
-        return found.hexdigest()[:12]
+            sha.update(self.recording.digest.encode())
+        return sha.hexdigest()[:12]
 
     @property
     def structure(self) -> tuple[str | int | bool, ...]:
         """What is not a number of the scene: the kind of body, how many vertices, which tables there are, and the kind of friction."""
-        frictions = [one.friction if isinstance(one.friction, str) else "coefficient" for one in self.surfaces]
+        frictions = [surface.friction if isinstance(surface.friction, str) else "coefficient" for surface in self.surfaces]
         ends = self.floor is not None and self.floor.ends
         return self.body.shape, len(self.body.vertices), self.gravity is None, self.damping is None, ends, *frictions
 
@@ -279,10 +279,10 @@ class Scenario(Table):
 def differ_in_start_alone(scenes: Sequence[Scenario]) -> bool:
     """Whether the bodies, gravity, floors and dampings of scenes are the same, so that one model serves all of them."""
     tables = [scene.__dict__ for scene in scenes]  # reading four attributes of each takes twice as long
-    own = tables[0]
+    first = tables[0]
     # `count` compares values only of what is not the same object; starts of one scene share its tables.
     return all(
-        [table[name] for table in tables].count(own[name]) == len(tables) for name in ("body", "gravity", "floor", "wall", "damping")
+        [table[name] for table in tables].count(first[name]) == len(tables) for name in ("body", "gravity", "floor", "wall", "damping")
     )
 
 

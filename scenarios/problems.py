@@ -66,15 +66,15 @@ def scene_name(text: str) -> str:
     Raises:
         SceneError: There is no such problem, or the definition has another version.
     """
-    given = re.fullmatch(IDENTIFIER, text)
-    if given is None:
+    match = re.fullmatch(IDENTIFIER, text)
+    if match is None:
         return text
     known = problems()
-    if given[1] not in known:
+    if match[1] not in known:
         last = list(known)[-1]
         raise SceneError(f"scene {text!r}: no problem has this number.{did_you_mean(text, known)} Give one from DS-001 to {last}.")
-    problem = known[given[1]]
-    if given[2] and text != problem.identifier:
+    problem = known[match[1]]
+    if match[2] and text != problem.identifier:
         raise SceneError(
             f"scene {text!r}: this version of dropspin has {problem.identifier}, another definition; CHANGELOG.md has the versions."
         )

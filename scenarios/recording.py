@@ -33,16 +33,16 @@ LARGEST_FILE = 200_000_000  # bytes
 def _rows(*width: int) -> BeforeValidator:
     """Rows of finite numbers, or numbers alone, as an array that does not change."""
 
-    def array(given: Any) -> Any:
+    def array(raw: Any) -> Any:
         try:
-            found: Array = np.array(given, dtype=np.float64)
+            values: Array = np.array(raw, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
-            found = np.empty(0)
-        if found.ndim != 1 + len(width) or found.shape[1:] != width or not len(found) or not (np.abs(found) <= LARGEST).all():
-            what = "".join(f"rows of {numbers} " for numbers in width)
-            raise ValueError(f"must be a list of {what}numbers of up to {LARGEST:g}")
-        found.setflags(write=False)
-        return found
+            values = np.empty(0)
+        if values.ndim != 1 + len(width) or values.shape[1:] != width or not len(values) or not (np.abs(values) <= LARGEST).all():
+            rows = "".join(f"rows of {numbers} " for numbers in width)
+            raise ValueError(f"must be a list of {rows}numbers of up to {LARGEST:g}")
+        values.setflags(write=False)
+        return values
 
     return BeforeValidator(array)
 
@@ -113,11 +113,11 @@ class Recording(Table):
     @cached_property
     def digest(self) -> str:
         """A hash of all that errors depend on."""
-        found = hashlib.sha256(repr(self.noise).encode())
+        sha = hashlib.sha256(repr(self.noise).encode())
         for toss in self.tosses:
             for values in (toss.t, toss.position, toss.orientation, toss.starts):
-                found.update(values.tobytes())
-        return found.hexdigest()
+                sha.update(values.tobytes())
+        return sha.hexdigest()
 
     @property
     def duration(self) -> float:
@@ -158,10 +158,10 @@ def start_of(recording: Recording) -> dict[str, Any]:
     return {name: recording.tosses[0].starts[0, part].tolist() for name, part in PARTS.items()}
 
 
-def _read(path: Path, given: str) -> Recording:
-    raw = read_file(path, given, "recording", LARGEST_FILE)
+def _read(path: Path, name: str) -> Recording:
+    raw = read_file(path, name, "recording", LARGEST_FILE)
     try:
         content = json.loads(raw)
     except (ValueError, RecursionError):
-        raise DropspinError(f"{given}: is not JSON, or damaged; give the file .json that dropspin log check wrote.") from None
-    return validated(Recording, given, content)
+        raise DropspinError(f"{name}: is not JSON, or damaged; give the file .json that dropspin log check wrote.") from None
+    return validated(Recording, name, content)

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BeforeValidator
 
 def printable(text: str) -> str:
     r"""A text with an escape in place of each character that is not printable, such as \u001b or \n. The text of JSON stays valid."""
-    return "".join(one if one.isprintable() else json.dumps(one)[1:-1] for one in text)
+    return "".join(char if char.isprintable() else json.dumps(char)[1:-1] for char in text)
 
 
 def verify_line(text: str) -> str:

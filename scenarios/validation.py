@@ -77,7 +77,7 @@ def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternativ
     path, table = _located(kind, problem)
     key = key_of(path, root)
     prefix = f"{key}: " if key else ""
-    given = shown(problem["input"])
+    value = shown(problem["input"])
     match problem["type"]:
         case "extra_forbidden":
             allowed = _keys(table, root)
@@ -88,25 +88,25 @@ def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternativ
             name = problem["ctx"]["discriminator"].strip("'")
             field = next(part for part in reversed(path) if isinstance(part, str))
             tags = ", ".join(map(repr, _tagged(table, field, name)))
-            found = "missing" if fault == "union_tag_not_found" else f"got {shown(problem['input'][name])}"
-            return f"{key_of([*path, name], root)}: {found}; must be one of {tags}."
+            got = "missing" if fault == "union_tag_not_found" else f"got {shown(problem['input'][name])}"
+            return f"{key_of([*path, name], root)}: {got}; must be one of {tags}."
         case "value_error" if isinstance(problem["input"], dict):  # of a whole table: the text names keys and values
             named = NAMED_KEY.fullmatch(str(problem["ctx"]["error"])) if not path else None
             return f"{prefix}{problem['ctx']['error']}." if named is None else f"{key_of(named[1].split('.'), root)}: {named[2]}."
         case "value_error":
-            return f"{prefix}got {given}; {problem['ctx']['error']}."
+            return f"{prefix}got {value}; {problem['ctx']['error']}."
         case "too_short" | "too_long" as fault:
             bound, count = problem["ctx"]["min_length" if fault == "too_short" else "max_length"], problem["ctx"]["actual_length"]
-            return f"{prefix}got {given}; must have at {'least' if fault == 'too_short' else 'most'} {_items(bound)}, has {count}."
+            return f"{prefix}got {value}; must have at {'least' if fault == 'too_short' else 'most'} {_items(bound)}, has {count}."
         case "tuple_type" if isinstance(problem["input"], dict) and not root:
-            return f"{prefix}got {given}; must be a list of tables, each of which begins with [[{key}]]."
+            return f"{prefix}got {value}; must be a list of tables, each of which begins with [[{key}]]."
         case "model_type" | "model_attributes_type":
             example = f", such as [{key}] with its keys below" if key and not root else ""
-            return f"{prefix}got {given}; must be a {'mapping' if root else 'table'}{example}."
+            return f"{prefix}got {value}; must be a {'mapping' if root else 'table'}{example}."
     message = re.sub("a (tuple|array)", "a list", problem["msg"].replace("Input should", "must").replace("valid ", ""))
     message = message.replace(f"{Decimal(repr(LARGEST)):f}", f"{LARGEST:g}")  # pydantic writes all of its zeros
     dotted = ".".join(part for part in path if isinstance(part, str))
-    return f"{prefix}got {given}; {message}{alternatives.get((dotted, problem['type']), alternatives.get((dotted, '*'), ''))}."
+    return f"{prefix}got {value}; {message}{alternatives.get((dotted, problem['type']), alternatives.get((dotted, '*'), ''))}."
 
 
 def _items(count: int) -> str:

@@ -88,16 +88,16 @@ def verify_field(scene: Scenario, name: str) -> None:
     path = path_of(name)
     if path[0] not in ("duration", *TABLES) or (path[0] != "duration" and len(path) == 1):
         raise NoSuchField(f"no such field.{did_you_mean(str(path[0]), TABLES)} Allowed: duration, or a field of {', '.join(TABLES)}.")
-    found: Any = content_of(scene)
+    value: Any = content_of(scene)
     for depth, key in enumerate(path):
         if isinstance(key, int):
-            if not isinstance(found, tuple) or key >= len(found):
-                raise NoSuchField(f"{key_of(path[:depth])} is {found!r}, which has no entry {key}.")
-        elif not isinstance(found, Mapping) or (key not in found and depth == 0):
+            if not isinstance(value, tuple) or key >= len(value):
+                raise NoSuchField(f"{key_of(path[:depth])} is {value!r}, which has no entry {key}.")
+        elif not isinstance(value, Mapping) or (key not in value and depth == 0):
             raise NoSuchField(f"scene {scene.name!r} has no [{path[0]}]; an absent table is not modelled.")
-        elif key not in found:
+        elif key not in value:
             return  # an optional key, which the schema of the scene accepts or refuses
-        found = found[key]
+        value = value[key]
 
 
 def with_fields(scene: Scenario, values: Iterable[tuple[str, Any]]) -> Scenario:
@@ -114,12 +114,12 @@ def with_fields(scene: Scenario, values: Iterable[tuple[str, Any]]) -> Scenario:
 
 def set_field(content: dict[str, Any], path: Path, value: Any) -> None:
     """Set a field of a nested mapping; tuples along its path become lists."""
-    found: Any = content
+    table: Any = content
     for key, following in pairwise(path):
         if isinstance(following, int):
-            found[key] = list(found[key])
-        found = found[key]
-    found[path[-1]] = value
+            table[key] = list(table[key])
+        table = table[key]
+    table[path[-1]] = value
 
 
 def with_height(scene: Scenario, height: float) -> Scenario:
@@ -217,14 +217,14 @@ def _seen(scene: Scenario, change: Callable[[tuple[float, ...]], tuple[float, ..
 
 def turned(scene: Scenario, rotation: Array) -> Scenario:
     """The scene, gravity and walls included, turned about the vertical by a rotation."""
-    found = scene.starting_at(turned_states(scene.initial_state, rotation))
-    return changed(found, scene.duration, **_seen(scene, lambda vector: tuple(map(float, rotate(rotation, np.array(vector))))))
+    started = scene.starting_at(turned_states(scene.initial_state, rotation))
+    return changed(started, scene.duration, **_seen(scene, lambda vector: tuple(map(float, rotate(rotation, np.array(vector))))))
 
 
 def mirrored(scene: Scenario) -> Scenario:
     """The scene, body and gravity included, mirrored at the plane x = 0."""
-    found = scene.starting_at(REFLECTED * scene.initial_state)
-    return changed(found, scene.duration, body=scene.body.mirrored(), **_seen(scene, lambda vector: (-vector[0], *vector[1:])))
+    started = scene.starting_at(REFLECTED * scene.initial_state)
+    return changed(started, scene.duration, body=scene.body.mirrored(), **_seen(scene, lambda vector: (-vector[0], *vector[1:])))
 
 
 def with_next_axes(scene: Scenario) -> Scenario:
@@ -236,9 +236,9 @@ def with_next_axes(scene: Scenario) -> Scenario:
 
 def with_previous_axes(states: Array) -> Array:
     """States of `with_next_axes`, shape (n, 13), by the original names of the axes."""
-    found = states.copy()
-    found[:, ORIENTATION] = multiply(states[:, ORIENTATION], NEXT_AXES)
-    return found
+    renamed = states.copy()
+    renamed[:, ORIENTATION] = multiply(states[:, ORIENTATION], NEXT_AXES)
+    return renamed
 
 
 def moving(scene: Scenario, offset: Array, velocity: Array) -> Scenario:
@@ -246,10 +246,10 @@ def moving(scene: Scenario, offset: Array, velocity: Array) -> Scenario:
     state = scene.initial_state
     state[POSITION] += offset
     state[VELOCITY] += velocity
-    found = scene.starting_at(state)
+    moved = scene.starting_at(state)
     if scene.wall is None:
-        return found
-    return changed(found, wall=_walls(scene, lambda wall: {"point": tuple(np.add(wall.point, offset).tolist())}))
+        return moved
+    return changed(moved, wall=_walls(scene, lambda wall: {"point": tuple(np.add(wall.point, offset).tolist())}))
 
 
 def heavy_neighbour(scene: Scenario) -> Scenario:

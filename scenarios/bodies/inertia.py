@@ -27,21 +27,21 @@ def symmetric(values: Sequence[Any]) -> list[list[Any]]:
     return [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
 
 
-def _moments(given: Any, validate: Callable[[Any], Any]) -> Any:
+def _moments(raw: Any, validate: Callable[[Any], Any]) -> Any:
     """A tensor as its rows, given so, as six numbers or with the names of URDF; anything else as `validate` does.
 
     Raises:
         ValueError: No body has the tensor.
     """
-    if isinstance(given, Mapping) and set(given) == set(OF_URDF):
-        given = [given[name] for name in OF_URDF]
-    if isinstance(given, list | tuple) and len(given) == 6:
-        given = symmetric(given)
-    if not (isinstance(given, list | tuple) and len(given) == 3 and all(isinstance(row, list | tuple) for row in given)):
-        return validate(given)
-    if not all(len(row) == 3 and all(type(value) in (int, float) and abs(value) <= LARGEST for value in row) for row in given):
+    if isinstance(raw, Mapping) and set(raw) == set(OF_URDF):
+        raw = [raw[name] for name in OF_URDF]
+    if isinstance(raw, list | tuple) and len(raw) == 6:
+        raw = symmetric(raw)
+    if not (isinstance(raw, list | tuple) and len(raw) == 3 and all(isinstance(row, list | tuple) for row in raw)):
+        return validate(raw)
+    if not all(len(row) == 3 and all(type(value) in (int, float) and abs(value) <= LARGEST for value in row) for row in raw):
         raise ValueError("a tensor must have three rows of three numbers")
-    matrix = np.array(given, dtype=float)
+    matrix = np.array(raw, dtype=float)
     if np.abs(matrix - matrix.T).max() > ASYMMETRY * np.abs(matrix).max():
         raise ValueError("a tensor must be symmetric")
     matrix = 0.5 * (matrix + matrix.T)
@@ -59,8 +59,8 @@ Moments = Annotated[PrincipalMoments | tuple[tuple[float, ...], ...], WrapValida
 
 def tensor(moments: tuple[Any, ...]) -> Array:
     """The tensor of moments as a table has them, shape (3, 3)."""
-    given = np.array(moments)
-    return np.diag(given) if given.ndim == 1 else given
+    array = np.array(moments)
+    return np.diag(array) if array.ndim == 1 else array
 
 
 def second_moments(points: Array, masses: Array | float) -> Array:

@@ -20,15 +20,15 @@ MOST_DRAWN = 2000  # faces; the hull of a finer mesh is drawn
 def _rows(kind: type) -> BeforeValidator:
     """Rows of three numbers as an array that does not change."""
 
-    def array(given: Any) -> Any:
+    def array(raw: Any) -> Any:
         try:
-            found: Array = np.array(given, dtype=kind)
+            values: Array = np.array(raw, dtype=kind)
         except (TypeError, ValueError, OverflowError):
-            found = np.empty(0)
-        if found.ndim != 2 or found.shape[1] != 3 or not len(found) or not (np.abs(found) <= LARGEST).all():
+            values = np.empty(0)
+        if values.ndim != 2 or values.shape[1] != 3 or not len(values) or not (np.abs(values) <= LARGEST).all():
             raise ValueError(f"must be a list of rows of three numbers of up to {LARGEST:g}")
-        found.setflags(write=False)
-        return found
+        values.setflags(write=False)
+        return values
 
     return BeforeValidator(array)
 

@@ -20,7 +20,7 @@ IGNORED = {"vt", "vn", "vp", "o", "g", "s", "usemtl", "mtllib", "l", "p", "lod",
 """Statements of an OBJ file that do not change its surface: texture, normals, names, groups, materials, lines and points."""
 
 
-def read_mesh(path: Path, given: str) -> tuple[Array, Faces]:
+def read_mesh(path: Path, name: str) -> tuple[Array, Faces]:
     """The vertices and the triangles of a mesh.
 
     The vertices of an OBJ file are those of the file, in its order; those of an STL file, which repeats them in each triangle, are merged
@@ -28,7 +28,7 @@ def read_mesh(path: Path, given: str) -> tuple[Array, Faces]:
 
     Args:
         path: The file.
-        given: The path as the user gave it, for messages.
+        name: The path as the user gave it, for messages.
 
     Returns:
         Vertices, shape (n, 3), and indices of the corners of triangles, shape (m, 3).
@@ -38,20 +38,20 @@ def read_mesh(path: Path, given: str) -> tuple[Array, Faces]:
     """
     kinds = {".obj": _obj, ".stl": _stl}
     if path.suffix.lower() not in kinds:
-        raise DropspinError(f"{given}: a mesh is a file .obj or .stl.")
-    raw = read_file(path, given, "mesh", LARGEST_FILE)
+        raise DropspinError(f"{name}: a mesh is a file .obj or .stl.")
+    raw = read_file(path, name, "mesh", LARGEST_FILE)
     try:
         points, faces = kinds[path.suffix.lower()](raw)
     except (ValueError, IndexError) as error:
-        raise DropspinError(f"{given}: not a mesh in the format of its ending: {error}.") from None
+        raise DropspinError(f"{name}: not a mesh in the format of its ending: {error}.") from None
     if not len(faces):
-        raise DropspinError(f"{given}: has no faces.")
+        raise DropspinError(f"{name}: has no faces.")
     if len(points) > MOST_VERTICES:
-        raise DropspinError(f"{given}: has {len(points):,} vertices; at most {MOST_VERTICES:,} are allowed.")
+        raise DropspinError(f"{name}: has {len(points):,} vertices; at most {MOST_VERTICES:,} are allowed.")
     if not np.isfinite(points).all():
-        raise DropspinError(f"{given}: has a vertex that is not finite.")
+        raise DropspinError(f"{name}: has a vertex that is not finite.")
     if faces.min() < 0 or faces.max() >= len(points):
-        raise DropspinError(f"{given}: has a face with a vertex that does not exist; there are {len(points):,}.")
+        raise DropspinError(f"{name}: has a face with a vertex that does not exist; there are {len(points):,}.")
     return points, faces
 
 
@@ -79,12 +79,12 @@ def _stl(raw: bytes) -> tuple[Array, Faces]:
     from trimesh.exchange.stl import HeaderError, load_stl_ascii, load_stl_binary
 
     try:
-        found = load_stl_binary(io.BytesIO(raw))  # by its length: the header of a binary file may begin with "solid"
+        content = load_stl_binary(io.BytesIO(raw))  # by its length: the header of a binary file may begin with "solid"
     except HeaderError:
         if not re.match(rb"\s*solid", raw):
             raise ValueError("a binary file of another length than its header says, or no STL") from None
-        found = load_stl_ascii(io.BytesIO(raw))
-    solids = found["geometry"].values() if "geometry" in found else [found]
+        content = load_stl_ascii(io.BytesIO(raw))
+    solids = content["geometry"].values() if "geometry" in content else [content]
     corners = np.concatenate([np.empty((0, 3)), *(np.asarray(solid["vertices"], dtype=float) for solid in solids)])
     points, first, which = np.unique(corners, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)

@@ -56,9 +56,9 @@ def largest_multiple(points: Array, squares: Array, enough: float) -> float:
         shares = np.append(np.ones(len(columns)), np.zeros(7))
         cost = np.append(np.zeros(len(columns)), [-1.0, *np.zeros(6)])
         bounds = [(0.0, None)] * (len(columns) + 1) + [(-SLACK, SLACK)] * 6
-        found = linprog(cost, shares[None], [1.0], np.hstack([_powers(columns).T, -target, slack]), np.zeros(9), bounds)
-        best, values = _largest(triangles, found.eqlin.marginals)
-        lower, upper = -float(found.fun), min(upper, float(values.max() + SLACK * np.abs(found.eqlin.marginals[:6]).sum()))
+        solved = linprog(cost, shares[None], [1.0], np.hstack([_powers(columns).T, -target, slack]), np.zeros(9), bounds)
+        best, values = _largest(triangles, solved.eqlin.marginals)
+        lower, upper = -float(solved.fun), min(upper, float(values.max() + SLACK * np.abs(solved.eqlin.marginals[:6]).sum()))
         if lower >= enough * unit or upper - lower <= AGREEMENT * lower:
             break
         columns = np.vstack([columns, best[np.argsort(-values)[:ADDED]]])
@@ -84,7 +84,7 @@ def _largest(triangles: Array, form: Array) -> tuple[Array, Array]:
         for begin, along in ((a, u), (a, v), (a + u, v - u)):
             share = -_slope(begin, along, quadratic, form) / np.sum(along @ quadratic * along, axis=1)
             candidates.append(begin + np.where((share > 0.0) & (share < 1.0), share, 0.0)[:, None] * along)
-        uu, uv, vv = (np.sum(one @ quadratic * other, axis=1) for one, other in ((u, u), (u, v), (v, v)))
+        uu, uv, vv = (np.sum(p @ quadratic * q, axis=1) for p, q in ((u, u), (u, v), (v, v)))
         along_u, along_v = (_slope(a, along, quadratic, form) for along in (u, v))
         s, t = (uv * along_v - vv * along_u) / (uu * vv - uv**2), (uv * along_u - uu * along_v) / (uu * vv - uv**2)
         inside = (s > 0.0) & (t > 0.0) & (s + t < 1.0)

@@ -90,11 +90,11 @@ def _among_planes(scene: Scenario, floor: Floor, law: Law | None) -> Truth | Non
     if scene.clearance < -TOUCHING * scene.body.size:
         return None  # it starts beside or below the floor
     struck = corner_impact(scene, floor, law)
-    found = [struck and until_near(scene, struck, walls=False)]
+    truths = [struck and until_near(scene, struck, walls=False)]
     if law is None:
         others = (problem(scene, floor) for problem in ON_FLOOR if problem is not corner_impact)
-        found += [until_near(scene, other) for other in others if other is not None]
-    return max(filter(None, found), key=lambda truth: truth.horizon, default=None)
+        truths += [until_near(scene, other) for other in others if other is not None]
+    return max(filter(None, truths), key=lambda truth: truth.horizon, default=None)
 
 
 def other_laws(scene: Scenario) -> dict[Law, Truth]:
@@ -108,13 +108,13 @@ def other_laws(scene: Scenario) -> dict[Law, Truth]:
     truth = truth_for(scene)
     if truth is None or not truth.events or scene.wall is not None or law_of(scene) not in FRICTION_LAWS:
         return {}
-    found = {law: truth_for(scene, law) for law in FRICTION_LAWS if law != law_of(scene)}
-    return {law: other for law, other in found.items() if other is not None and _has_other_impulses(truth, other)}
+    truths = {law: truth_for(scene, law) for law in FRICTION_LAWS if law != law_of(scene)}
+    return {law: other for law, other in truths.items() if other is not None and _has_other_impulses(truth, other)}
 
 
 def _has_other_impulses(truth: Truth, other: Truth) -> bool:
     """Whether an impact that two solutions have in common has another impulse."""
     return any(
-        np.linalg.norm(one.after[VELOCITY] - another.after[VELOCITY]) > SAME_IMPULSE * np.linalg.norm(one.before[VELOCITY])
-        for one, another in zip(truth.events, other.events, strict=False)
+        np.linalg.norm(first.after[VELOCITY] - second.after[VELOCITY]) > SAME_IMPULSE * np.linalg.norm(first.before[VELOCITY])
+        for first, second in zip(truth.events, other.events, strict=False)
     )

@@ -114,10 +114,10 @@ def _stays_flat(scene: Scenario, floor: Floor) -> bool:
 
 def _lies(scene: Scenario) -> bool:
     """Whether a small turn about no horizontal axis lowers a round body on the floor, so that it does not fall over from there."""
-    body, own, angles = scene.body, np.array(scene.start.orientation), np.linspace(0.0, 2.0 * math.pi, DIRECTIONS, endpoint=False)
+    body, pose, angles = scene.body, np.array(scene.start.orientation), np.linspace(0.0, 2.0 * math.pi, DIRECTIONS, endpoint=False)
     axes = np.stack([np.cos(angles), np.zeros(DIRECTIONS), np.sin(angles)], axis=1)
-    heights = [-float(body.lowest(turn, 0.0)[0, 1]) for turn in multiply(about(axes, np.full(DIRECTIONS, SMALL_TURN)), own)]
-    return min(heights) >= -float(body.lowest(own, 0.0)[0, 1]) - 1e-12 * body.size
+    heights = [-float(body.lowest(turn, 0.0)[0, 1]) for turn in multiply(about(axes, np.full(DIRECTIONS, SMALL_TURN)), pose)]
+    return min(heights) >= -float(body.lowest(pose, 0.0)[0, 1]) - 1e-12 * body.size
 
 
 def _turns_about_the_vertical(scene: Scenario) -> bool:

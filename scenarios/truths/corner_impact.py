@@ -135,8 +135,8 @@ def _flights(scene: Scenario, planes: Sequence[_Plane], start: Array) -> Iterato
     motion, now, longest, left = flight_states(start, inertia, g), 0.0, 0.0, None
     for number in range(MAX_IMPACTS + 1):
         until = min(scene.duration, now + motion.horizon)
-        found = [(plane, _next_impact(scene, plane.seen_flight(motion, inertia), until - now, leaves=plane is left)) for plane in planes]
-        contacts = sorted(((plane, contact) for plane, contact in found if contact is not None), key=lambda one: one[1].time)
+        pairs = [(plane, _next_impact(scene, plane.seen_flight(motion, inertia), until - now, leaves=plane is left)) for plane in planes]
+        contacts = sorted(((plane, contact) for plane, contact in pairs if contact is not None), key=lambda pair: pair[1].time)
         if not contacts:
             yield _Flight(motion, until, reason="" if until == scene.duration else TURNS_OVER)
             return

@@ -95,8 +95,8 @@ def _decayed(rate: float, turned: Array) -> Array:
     """D(k) = (1 - exp(-k λ))/k, which is λ for k = 0."""
     if rate == 0.0:
         return turned
-    found: Array = -np.expm1(-rate * turned) / rate
-    return found
+    decayed: Array = -np.expm1(-rate * turned) / rate
+    return decayed
 
 
 def _inverse(time: Callable[[Array], Array], pace: Callable[[Array], Array], t: Array) -> Array:

@@ -164,8 +164,8 @@ class AsymmetricTop:
         at = self._elliptic(t)
         triads, spins = self._body_frame(at)
         angle = self._precession(t, at)
-        cos, sin, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
-        turned = np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]]).transpose(2, 0, 1)
+        cos, sin, zeros, ones = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
+        turned = np.array([[cos, -sin, zeros], [sin, cos, zeros], [zeros, zeros, ones]]).transpose(2, 0, 1)
         matrices = self._to_space @ turned @ triads.transpose(0, 2, 1)  # from a, b, c to space
         orientation = Rotation.from_matrix(matrices @ self._axes.T).as_quat()
         return orientation, np.einsum("nij,nj->ni", matrices, spins)

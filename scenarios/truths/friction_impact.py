@@ -54,18 +54,18 @@ def cone_impulse(K: Array, u: Array, e: float, friction: float) -> Array | None:
         push = N - friction * _along(angle)
         return float((K[1] @ push) * (u @ _across(angle)) - (1.0 + e) * u[1] * _turning(K, friction, angle))
 
-    found = []
+    impulses = []
     sticks = np.linalg.solve(K, -u - e * u[1] * N)
     if math.hypot(sticks[0], sticks[2]) <= friction * sticks[1]:
-        found.append(sticks)
+        impulses.append(sticks)
     for angle in _angles(across):
         push = N - friction * _along(angle)
         response = float(K[1] @ push)
         if response > 0.0:
             impulse = -(1.0 + e) * u[1] / response * push
             if (u + K @ impulse) @ _along(angle) > 0.0:
-                found.append(impulse)
-    return found[0] if len(found) == 1 else None
+                impulses.append(impulse)
+    return impulses[0] if len(impulses) == 1 else None
 
 
 def integrated_impulse(K: Array, u: Array, e: float, friction: float, restitution: Restitution) -> Array:

@@ -31,9 +31,9 @@ def measured(recording: Recording, toss: Toss) -> Truth:
     rates = np.hstack([np.diff(positions, axis=0), rotation_vector(quaternions[:-1], quaternions[1:])]) / steps
 
     def states(times: Array) -> Array:
-        found = np.stack([np.interp(times, t, column) for column in poses.T], axis=1)
-        found[:, ORIENTATION] /= length(found[:, ORIENTATION])[:, np.newaxis]
-        return np.hstack([found, rates[np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(rates) - 1)]])
+        pose = np.stack([np.interp(times, t, column) for column in poses.T], axis=1)
+        pose[:, ORIENTATION] /= length(pose[:, ORIENTATION])[:, np.newaxis]
+        return np.hstack([pose, rates[np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(rates) - 1)]])
 
     others = len(recording.tosses) - 1
     more = f", the first of {others + 1}" if others else ""

@@ -76,8 +76,8 @@ def point_contact(scene: Scenario, floor: Floor) -> Truth | None:
     fastest = max(float(length(start[VELOCITY])), float(length(spin)) * scene.body.size)
     if length(slip if contact.is_rough else slip * UP) > AT_REST * fastest:
         return None
-    found = _solved(scene, contact, floor.coefficient)
-    return found if found.horizon > 0.0 else None
+    truth = _solved(scene, contact, floor.coefficient)
+    return truth if truth.horizon > 0.0 else None
 
 
 @dataclass(frozen=True, eq=False)

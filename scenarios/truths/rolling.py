@@ -69,8 +69,8 @@ def rolling(scene: Scenario, floor: Floor) -> Truth | None:
     lever = (share - 1.0) / radius
 
     def spun(free: Array, change: Array) -> Array:
-        found: Array = free + lever * np.cross(UP, change)
-        return found
+        spins: Array = free + lever * np.cross(UP, change)
+        return spins
 
     def spins(t: Array) -> tuple[Array, Array]:
         change, way = lost(t)

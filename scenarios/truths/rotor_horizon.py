@@ -48,9 +48,7 @@ def horizon(moments: tuple[float, ...], spin: tuple[Fraction, ...], rounding: Ar
     P, Q = math.sqrt(abs(Ic * (Ic - Ib))), math.sqrt(abs(Ia * (Ib - Ia)))
     at_c, at_a = P * abs(float(spin[2])), Q * abs(float(spin[0]))
     of_state = P * rounding[2] + Q * rounding[0]
-    of_c, of_a = (
-        at * EPS * float((one + other) / abs(one - other)) if one != other else 0.0 for at, one, other in ((at_c, Ic, Ib), (at_a, Ib, Ia))
-    )
+    of_c, of_a = (at * EPS * float((Ij + Ik) / abs(Ij - Ik)) if Ij != Ik else 0.0 for at, Ij, Ik in ((at_c, Ic, Ib), (at_a, Ib, Ia)))
     separation = abs(float(Ic * (Ic - Ib) * spin[2] ** 2 - Ia * (Ib - Ia) * spin[0] ** 2))
     change_c, change_a = P * rounding[2] + of_c, Q * rounding[0] + of_a
     change = (2.0 * at_c + change_c) * change_c + (2.0 * at_a + change_a) * change_a

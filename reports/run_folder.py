@@ -14,7 +14,7 @@ from dropspin.reports.document import Document
 from dropspin.reports.html.report import html_report
 from dropspin.reports.junit import junit_xml
 from dropspin.reports.markdown import markdown
-from dropspin.reports.plots.chart import figure_of, save_figure
+from dropspin.reports.plots.figure import save_charts
 from dropspin.reports.plots.figures import CHARTS, report_charts
 from dropspin.reports.stories.run import document, overview
 
@@ -22,6 +22,9 @@ OURS = frozenset(
     {"run.json", "results.parquet", "results.csv", "report.html", "report.md", "replay.html", "junit.xml", "plots"}
     | {"trajectories", "ensembles"}
 )
+
+PLOT_FILES = ("svg", "png", "pdf", "csv")
+"""The formats of plots as files; CSV for their data."""
 
 
 def write_report(results: Results, folder: str | Path, sections: Sequence[Document] = ()) -> Path:
@@ -44,7 +47,7 @@ def write_report(results: Results, folder: str | Path, sections: Sequence[Docume
 
 
 def fill(results: Results, folder: Path, sections: Sequence[Document] = (), plots: Collection[str] = ()) -> None:
-    """Write the data and the reports of a run into an empty folder, and its plots as files of these kinds, `svg` or `png`."""
+    """Write the data and the reports of a run into an empty folder, and its plots as files of some `PLOT_FILES`."""
     summary, charts_of = overview(results), report_charts(results)
     save(results, folder, summary.conclusion)
     results.table.to_csv(folder / "results.csv", index=False)
@@ -56,7 +59,7 @@ def fill(results: Results, folder: Path, sections: Sequence[Document] = (), plot
     for kind in plots:
         for number, scene in enumerate(results.scenes):
             for name, charts in charts_of.get(scene, {}).items():
-                save_figure(figure_of(charts), folder / "plots" / f"{number:02d}-{name}.{kind}")
+                save_charts(charts, folder / "plots" / f"{number:02d}-{name}.{kind}")
 
 
 def run_folder(folder: str | Path) -> AbstractContextManager[Path]:
@@ -102,5 +105,5 @@ def _files_of_run(folder: Path) -> set[str]:
         arrays, scenes = {*filter(ARRAY_FILE.fullmatch, [*content["trajectories"], *content["ensembles"]])}, content["scenes"]
     except (OSError, ValueError, TypeError, KeyError):
         return set()
-    plots = {f"plots/{number:02d}-{kind}.{ending}" for number in range(len(scenes)) for kind in CHARTS for ending in ("svg", "png")}
+    plots = {f"plots/{number:02d}-{kind}.{ending}" for number in range(len(scenes)) for kind in CHARTS for ending in PLOT_FILES}
     return {*OURS, *arrays, *plots}

@@ -13,8 +13,8 @@ from dropspin.reports.document import Charts, Document
 from dropspin.reports.html.study import study_page
 from dropspin.reports.markdown import markdown
 from dropspin.reports.output import write_table
-from dropspin.reports.plots.chart import figure_of, save_figure
 from dropspin.reports.plots.chart_data import chart_data
+from dropspin.reports.plots.figure import figure_of, save_figure
 from dropspin.reports.stories.history import document as history_document
 from dropspin.reports.stories.study import Study
 from dropspin.scenarios import DropspinError, Scenario

@@ -244,18 +244,23 @@ def profile(errors: Mapping[str, Sequence[float]]) -> dict[str, tuple[NDArray[np
     relative error as the measure. Errors below `NEGLIGIBLE` are rounding, and count as equal to it.
 
     Args:
-        errors: The relative error of each engine in each scene; NaN where it has none, which counts as a ratio that no τ reaches.
+        errors: The relative error of each engine in each scene; infinite where it failed, which counts as a ratio that no τ reaches; NaN
+            where it was not measured. Such a scene does not count for the engine.
 
     Returns:
-        The ratios τ at which the share rises, and the share there, shape (n,) each; both begin with τ = 1.
+        The ratios τ at which the share rises, and the share there, shape (n,) each; both begin with τ = 1. Engines that were measured in no
+        scene are left out.
     """
     table = np.maximum(np.array(list(errors.values())), NEGLIGIBLE)  # NaN stays NaN
-    ratios = np.where(np.isnan(table), np.inf, table / np.nanmin(np.where(np.isnan(table), np.inf, table), axis=0))
-    found = {}
-    for label, own in zip(errors, ratios, strict=True):
-        at = np.unique([1.0, *own[np.isfinite(own)]])
-        found[label] = at, np.mean(own[None, :] <= at[:, None], axis=1)
-    return found
+    least = np.min(np.nan_to_num(table, nan=np.inf, posinf=np.inf), axis=0)
+    all_ratios = np.divide(table, least, out=table.copy(), where=np.isfinite(table))  # infinite and NaN stay so
+    profiles = {}
+    for label, row in zip(errors, all_ratios, strict=True):
+        ratios = row[~np.isnan(row)]
+        if len(ratios):
+            at = np.unique([1.0, *ratios[np.isfinite(ratios)]])
+            profiles[label] = at, np.mean(ratios[None, :] <= at[:, None], axis=1)
+    return profiles
 
 
 def successive(releases: Sequence[Release]) -> dict[str, list[str]]:

@@ -20,7 +20,10 @@ from dropspin.reports.terminal.safe import echo
     help="Add a study: the folder that dropspin tradeoff, limits, symmetries or reproduce wrote; repeat for more.",
 )
 @click.option(
-    "--plots", multiple=True, type=click.Choice(["svg", "png"]), help="Also write the plots as files of this format; repeat for both."
+    "--plots",
+    multiple=True,
+    type=click.Choice(["svg", "png", "pdf", "csv"]),
+    help="Also write the plots as files of this format, or their data as CSV; repeat for more.",
 )
 @within_option
 def report_command(run: str, studies: tuple[str, ...], plots: tuple[str, ...], within: float | None) -> None:

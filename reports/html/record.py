@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dropspin.comparisons.engines.options import calibrated_label
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.record import findings
@@ -15,7 +16,7 @@ from dropspin.comparisons.record.findings import Case, Change, Other, Release, l
 from dropspin.reports.pages import page
 from dropspin.reports.plots.chart import Chart, Line
 from dropspin.reports.plots.chart_data import chart_data
-from dropspin.reports.plots.colours import engine_styles
+from dropspin.reports.plots.colours import engine_styles, human_label
 from dropspin.reports.stories import numbers
 from dropspin.reports.stories import record as view
 from dropspin.reports.stories.scene import modelled
@@ -134,23 +135,32 @@ class Site:
                 continue
             x, median = np.array([(case.cost, case.median_cost) for case in cases]).T
             y, low, high = np.maximum(np.abs([(case.values.get(metric, np.nan), case.low, case.high) for case in cases]), least).T
-            colour, marker = self.styles[label]
+            style = self.styles[label]
             gap = np.full(len(x), np.nan)
             across, along = np.array([x, x, x, x, median, x]).T.ravel(), np.array([low, high, gap, y, y, gap]).T.ravel()
-            lines += [Line(label, x, y, colour, marker=marker), Line(label, across, along, colour, 1.0)]
+            lines += [Line(label, x, y, **style._asdict()), Line(label, across, along, style.colour, 1.0)]
         error = self.quantity(scene).partition(",")[0]
         return chart_data(Chart("wall time per simulated second [s]", error, lines, x_log=True, y_log=True))
 
     def profiles(self, labels: Sequence[str]) -> dict[str, Any]:
         """The plot of performance profiles at the finest time step."""
         cases = {label: self.newest[self.engines[label]].at(label, self.dts[-1]) for label in labels}
-        found = findings.profile({label: [relative_error(own.get(scene), scene) for scene in self.scenes] for label, own in cases.items()})
-        end = 2.0 * max(float(ratios[-1]) for ratios, _ in found.values())
+
+        def error(case: Case | None, scene: str) -> float:
+            return np.inf if case and case.verdict in BREAKDOWNS else relative_error(case, scene)
+
+        errors = {label: [error(of_label.get(scene), scene) for scene in self.scenes] for label, of_label in cases.items()}
+        profiles = findings.profile(errors)
+        end = 2.0 * max(float(ratios[-1]) for ratios, _ in profiles.values())
         lines = []
-        for label, (ratios, shares) in found.items():
-            colour, marker = self.styles[label]
-            lines.append(Line(label, np.append(ratios, end), np.append(shares, shares[-1]), colour, marker=marker, is_step=True))
-        return chart_data(Chart("τ: error over the smallest error of the scene", "share of scenes within τ", lines, x_log=True))
+        for label, (ratios, shares) in profiles.items():
+            style = self.styles[label]._asdict()
+            lines.append(Line(label, np.append(ratios, end), np.append(shares, shares[-1]), **style, is_sparse=True, is_step=True))
+        counts = ", ".join(f"{human_label(label)} {np.count_nonzero(~np.isnan(errors[label]))}" for label in profiles)
+        remark = f"Scenes that count for each engine: {counts}."
+        return chart_data(
+            Chart("τ: error over the smallest error of the scene", "share of scenes within τ", lines, x_log=True, remark=remark)
+        )
 
 
 def files_of_site(folder: Path) -> set[str]:

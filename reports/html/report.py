@@ -19,7 +19,7 @@ from dropspin.reports.pages import page
 from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.plots.colours import engine_colours
-from dropspin.reports.plots.convergence import INTERVAL_WIDTH, PREDICTED
+from dropspin.reports.plots.convergence import PREDICTED
 from dropspin.reports.plots.figures import CHARTS
 from dropspin.reports.plots.spins import wobbles_freely
 from dropspin.reports.replay import as_data, replay_of
@@ -115,7 +115,7 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
         "ensemble": ensemble.sort_values("metric", key=lambda metrics: metrics.map(order.index), kind="stable").to_dict("records"),
         "wobbles": wobbles_freely(scene),
         "scales": [f"{scale(scene, unit):.3g} {unit}" for unit in dict.fromkeys(own["unit"]) if unit not in ("1", "rad")],
-        "has_intervals": any(line.width == INTERVAL_WIDTH for line in convergence),
+        "has_intervals": any(line.is_fill for line in convergence),
         "has_predictions": any(line.label == PREDICTED for line in convergence),
         "charts": {kind: [chart_data(chart) for chart in charts.get(kind, ())] for kind in CHARTS},
     }

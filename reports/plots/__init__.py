@@ -1,7 +1,7 @@
 """Plots: each function returns a `Chart`, and each `plot_` function draws one into axes, for notebooks and papers.
 
-A plot function creates no figure and no legend; it labels its lines, so that `axes.legend()` creates a legend. docs/examples.md shows every
-plot with the code that draws it.
+A plot function creates no figure and no legend; it labels its lines, so that `axes.legend()` creates a legend.
+`figure_of` makes a whole figure of charts, for a column or a page. docs/examples.md shows every plot with the code that draws it.
 """
 
 from dropspin.reports.plots.bounces import bounce_ladder as bounce_ladder
@@ -9,7 +9,7 @@ from dropspin.reports.plots.bounces import plot_bounce_ladder as plot_bounce_lad
 from dropspin.reports.plots.chart import Chart as Chart
 from dropspin.reports.plots.chart import Line as Line
 from dropspin.reports.plots.chart import draw as draw
-from dropspin.reports.plots.chart import figure_of as figure_of
+from dropspin.reports.plots.colours import human_label as human_label
 from dropspin.reports.plots.convergence import error_over_dt as error_over_dt
 from dropspin.reports.plots.convergence import plot_error_over_dt as plot_error_over_dt
 from dropspin.reports.plots.ensembles import angular_momentum_of_ensemble as angular_momentum_of_ensemble
@@ -18,6 +18,10 @@ from dropspin.reports.plots.ensembles import plot_angular_momentum_of_ensemble a
 from dropspin.reports.plots.ensembles import plot_energy_of_ensemble as plot_energy_of_ensemble
 from dropspin.reports.plots.ensembles import plot_rest_of_ensemble as plot_rest_of_ensemble
 from dropspin.reports.plots.ensembles import rest_of_ensemble as rest_of_ensemble
+from dropspin.reports.plots.figure import figure_of as figure_of
+from dropspin.reports.plots.figure import label_ends as label_ends
+from dropspin.reports.plots.figure import save_data as save_data
+from dropspin.reports.plots.figure import save_figure as save_figure
 from dropspin.reports.plots.growth import error_growth as error_growth
 from dropspin.reports.plots.growth import plot_error_growth as plot_error_growth
 from dropspin.reports.plots.history import plot_history as plot_history
@@ -33,5 +37,6 @@ from dropspin.reports.plots.over_time import quantities as quantities
 from dropspin.reports.plots.over_time import tilt as tilt
 from dropspin.reports.plots.spins import plot_polhode as plot_polhode
 from dropspin.reports.plots.spins import polhode as polhode
+from dropspin.reports.plots.style import style as style
 from dropspin.reports.plots.tradeoff import error_over_cost as error_over_cost
 from dropspin.reports.plots.tradeoff import plot_tradeoff as plot_tradeoff

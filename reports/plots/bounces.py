@@ -36,7 +36,7 @@ def bounce_ladder(results: Results, scene_name: str) -> Chart:
     lines = []
     for motion, style in at_one_step(results, results.trajectories, scene_name, min):
         heights = apexes(scene, motion) / exact[0]
-        lines.append(Line(x=np.arange(len(heights), dtype=float), y=heights, **style | {"width": 0.0}))
+        lines.append(Line(x=np.arange(len(heights), dtype=float), y=heights, **style | {"width": 0.0, "is_sparse": False}))
     shown = max([lasting, *(len(line.x) for line in lines)])
     stairs = exact[:shown] / exact[0]
     lines.append(Line(truth.word, np.arange(len(stairs), dtype=float), stairs, width=1.0, dashes="dashed"))

@@ -1,23 +1,33 @@
 """A chart as data: the lines of a plot with their labels, scales and remarks. matplotlib and the script of the report draw it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass, replace
+from itertools import cycle
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dropspin.comparisons.engines.options import parts_of
-from dropspin.reports.plots.style import REPORT, ROUNDING, Array, ink, label_powers, load_matplotlib
+from dropspin.reports.plots.colours import Dashes, human_label
+from dropspin.reports.plots.style import LINE, ROUNDING, Array, ink, is_grey, label_powers
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-Dashes = Literal["", "dashed", "dotted"]
-DASHES: dict[Dashes, Any] = {"": "-", "dashed": (0, (3, 3)), "dotted": ":"}
+DASHES: dict[Dashes, Any] = {"": "-", "dashed": (0, (3, 3)), "dotted": ":", "dashdot": "-.", "long": (0, (9, 2))}
+GREYS: tuple[tuple[str, Dashes], ...] = (
+    ("0", ""),
+    ("0.55", ""),
+    ("0.25", "dashdot"),
+    ("0.65", "long"),
+    ("0.4", "dashed"),
+    ("0.7", "dotted"),
+)
+"""Greys and dash patterns of the lines in a grey style, in the order of their labels."""
 MARKER = 5.0  # points
+BETWEEN_MARKERS = 0.18  # of the diagonal of the axes
+LONGEST_ROW = 24
+"""Characters of a line of the label of a row, and of the label of the y axis."""
 LONGEST_LEVEL_LABEL = 8  # characters of a tick of the x axis
 FLAT = 1e-9
 """Values that vary by less than this share of the largest value are drawn as constant, so that the axis does not show rounding errors."""
@@ -35,6 +45,7 @@ class Line:
         width: Width [points]; 0 for markers alone.
         dashes: The dash pattern of the line.
         marker: A marker of matplotlib; empty for none.
+        is_sparse: Whether markers are at a few places only, at others for each line, so that lines that coincide stay visible.
         low, high: A band around the values, shape (n,) each.
         is_step: Whether a value holds until the next one.
         is_fill: Whether only the band is drawn: an envelope.
@@ -44,9 +55,10 @@ class Line:
     x: Array
     y: Array
     colour: str = ""
-    width: float = 1.5
+    width: float = LINE
     dashes: Dashes = ""
     marker: str = ""
+    is_sparse: bool = False
     low: Array | None = None
     high: Array | None = None
     is_step: bool = False
@@ -96,13 +108,9 @@ class Chart:
 
 
 def draw(chart: Chart, axes: "Axes") -> None:
-    """Draw a chart with matplotlib."""
+    """Draw a chart with matplotlib, in the current style; in a grey one, lines differ by grey, dash pattern and marker."""
     axes.set(xscale="log" if chart.x_log else "linear", yscale="log" if chart.y_log else "linear")
-    labelled: set[str] = set()
-    for line in chart.lines:
-        # One entry of the legend for all lines of a label; matplotlib leaves out labels that begin with an underscore.
-        _draw_line(chart, line, "_" if line.label in labelled else line.label, axes)
-        labelled.add(line.label)
+    _draw_lines(in_grey(chart) if is_grey() else chart, axes)
     if chart.is_flat:
         low, high = axes.get_ylim()
         middle = 0.5 * (low + high)
@@ -116,7 +124,7 @@ def draw(chart: Chart, axes: "Axes") -> None:
     if chart.y_log:
         label_powers(axes, "y")
     elif chart.rows:
-        axes.set_yticks(range(len(chart.rows)), [_in_lines(row) for row in chart.rows], fontsize=7)
+        axes.set_yticks(range(len(chart.rows)), [fill(human_label(row), LONGEST_ROW) for row in chart.rows], fontsize="small")
         axes.set_ylim(len(chart.rows) - 0.5, -0.5)
         axes.grid(visible=False)
     else:
@@ -129,59 +137,48 @@ def draw(chart: Chart, axes: "Axes") -> None:
     if chart.x_range is not None:
         axes.set_xlim(*chart.x_range)
     axes.set_xlabel(chart.x_label)
-    axes.set_ylabel(chart.y_label)
+    axes.set_ylabel("\n".join(fill(part, LONGEST_ROW) for part in chart.y_label.splitlines()))
 
 
-def _draw_line(chart: Chart, line: Line, label: str, axes: "Axes") -> None:
+def in_grey(chart: Chart) -> Chart:
+    """The chart for print without colours: a grey and a dash pattern for each label with a colour; for bars, darker along the legend."""
+    from matplotlib.colors import to_rgb
+
+    labels = list(dict.fromkeys(line.label for line in chart.lines if line.colour and np.ptp(to_rgb(line.colour)) > 0.0))
+    ramp: list[tuple[str, Dashes]] = [(f"{level:.2f}", "") for level in np.linspace(0.85, 0.0, len(labels))]
+    greys = dict(zip(labels, ramp if chart.rows else cycle(GREYS), strict=False))
+
+    def grey(line: Line) -> Line:
+        shade, dashes = greys.get(line.label, (line.colour, line.dashes))
+        return replace(line, colour=shade, dashes=line.dashes or dashes)
+
+    return replace(chart, lines=[grey(line) for line in chart.lines])
+
+
+def _draw_lines(chart: Chart, axes: "Axes") -> None:
+    labelled: set[str] = set()
+    sparse = [line for line in chart.lines if line.is_sparse]
+    for line in chart.lines:
+        # One entry of the legend for all lines of a label; matplotlib leaves out labels that begin with an underscore.
+        label = "_" if line.label in labelled else human_label(line.label)
+        labelled.add(line.label)
+        style: dict[str, Any] = {"solid_capstyle": "butt"} if chart.rows else {}
+        if line.is_sparse:
+            number = next(number for number, other in enumerate(sparse) if other is line)
+            style["markevery"] = ((number + 0.5) / len(sparse) * BETWEEN_MARKERS, BETWEEN_MARKERS)
+        _draw_line(line, label, np.maximum(line.y, ROUNDING) if chart.y_log else line.y, style, axes)
+
+
+def _draw_line(line: Line, label: str, y: Array, style: dict[str, Any], axes: "Axes") -> None:
     colour = line.colour or ink()
     if line.low is not None and line.high is not None:
-        alpha, of_band = (0.3, label) if line.is_fill else (0.15, None)
-        axes.fill_between(line.x, line.low, line.high, color=colour, linewidth=0.0, alpha=alpha, label=of_band)
+        edge, of_band = (0.8, label) if line.is_fill else (0.0, None)
+        axes.fill_between(line.x, line.low, line.high, facecolor=(colour, 0.15), edgecolor=colour, linewidth=edge, label=of_band)
     if line.is_fill:
         return
-    y = np.maximum(line.y, ROUNDING) if chart.y_log else line.y
-    style: dict[str, Any] = {"linestyle": DASHES[line.dashes] if line.width else "none", "linewidth": line.width, "color": colour}
+    style |= {"linestyle": DASHES[line.dashes] if line.width else "none", "linewidth": line.width, "color": colour}
     if line.marker:
         style |= {"marker": line.marker, "markerfacecolor": "none", "markersize": MARKER}
     if line.is_step:
         style["drawstyle"] = "steps-post"
-    if chart.rows:
-        style["solid_capstyle"] = "butt"
     axes.plot(line.x, y, label=label, **style)
-
-
-def _in_lines(label: str) -> str:
-    """The label of an engine, two options per line."""
-    name, options = parts_of(label)
-    lines = [",".join(options[first : first + 2]) for first in range(0, len(options), 2)]
-    return f"{name}[" + ",\n".join(lines) + "]" if options else name
-
-
-def figure_of(panels: Sequence[Chart]) -> "Figure":
-    """A figure of panels in the style of the report, at most three in a row, with one legend."""
-    load_matplotlib()
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
-
-    across = min(len(panels), 3)
-    down = -(-len(panels) // across)
-    named: dict[str, Any] = {}
-    with rc_context(REPORT):
-        figure = Figure(figsize=(3.7 * across, 2.9 * down), layout=ConstrainedLayoutEngine(w_pad=0.12))
-        for place, panel in enumerate(panels, 1):
-            axes = figure.add_subplot(down, across, place)
-            draw(panel, axes)
-            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-                named.setdefault(label, handle)
-        figure.legend(list(named.values()), list(named), loc="outside upper left", ncols=min(len(named), 5), fontsize=9)
-    return figure
-
-
-def save_figure(figure: "Figure", file: "Path") -> None:
-    """Save a figure on white, as SVG with text as text or as PNG; equal figures give equal files."""
-    from matplotlib import rc_context
-
-    stamps = ["Software"] if file.suffix == ".png" else ["Date", "Creator"]
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": file.stem}):
-        figure.savefig(file, dpi=200, facecolor="white", metadata=dict.fromkeys(stamps))

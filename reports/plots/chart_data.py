@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dropspin.reports.plots.chart import Chart, Line
+from dropspin.reports.plots.colours import human_label
 from dropspin.reports.plots.style import Array
 
 DIGITS = 6
@@ -23,7 +24,8 @@ def chart_data(chart: Chart) -> dict[str, Any]:
     reference = next((line for line in chart.lines if chart.reference and line.label == chart.reference), None)
     xs: list[Array] = []
     lines = [_line(line, reference, xs) for line in chart.lines if len(line.x)]
-    return _given(vars(chart) | {"is_flat": chart.is_flat, "x": list(map(_positions, xs)), "lines": lines})
+    rows = list(map(human_label, chart.rows))
+    return _given(vars(chart) | {"is_flat": chart.is_flat, "rows": rows, "x": list(map(_positions, xs)), "lines": lines})
 
 
 def _given(fields: Mapping[str, Any]) -> dict[str, Any]:
@@ -41,7 +43,15 @@ def _line(line: Line, reference: Line | None, xs: list[Array]) -> dict[str, Any]
     if reference is not None and common:
         y[:common] -= reference.y[:common]
     low, high = (None if values is None else _packed(values) for values in (line.low, line.high))
-    drawn = {"x": number, "y": None if line.is_fill else _packed(y), "low": low, "high": high, "common": common}
+    name = human_label(line.label)
+    drawn = {
+        "name": name if name != line.label else "",
+        "x": number,
+        "y": None if line.is_fill else _packed(y),
+        "low": low,
+        "high": high,
+        "common": common,
+    }
     return _given(vars(line) | drawn | {"is_fill": False})
 
 

@@ -1,31 +1,88 @@
-"""Labels and styles that all plots and tables share: a colour and a marker per engine, by its label."""
+"""Labels and styles that all plots and tables share: a name to read, a colour, a marker and a dash pattern per engine, by its label."""
 
+import re
 from collections.abc import Sequence
+from typing import Literal, NamedTuple
 from zlib import crc32
+
+from dropspin.comparisons.engines.options import parts_of
+
+Dashes = Literal["", "dashed", "dotted", "dashdot", "long"]
 
 # Okabe & Ito (2008), Color Universal Design: distinguishable with any colour vision, on white and on near black.
 KNOWN = {"wang": ("#0072B2", "o"), "mujoco": ("#D55E00", "s"), "pybullet": ("#009E73", "D")}
-COLOURS = ("#CC79A7", "#E69F00", "#56B4E9", "#8C8C8C", "#A6761D", "#7B5EA7", "#B33B24", "#3D8B8B")
+# The last six were chosen to differ from all others by 11 or more in CAM02-UCS, also with simulated deuteranopia and protanopia.
+COLOURS = ("#CC79A7", "#E69F00", "#56B4E9", "#336666", "#994433", "#6688FF", "#88BB77", "#BBAAAA", "#CC0099")
 MARKERS = ("^", "v", "P", "X", "*")
 STYLES = [(colour, marker) for marker in MARKERS for colour in COLOURS]
+REPEATED: tuple[Dashes, ...] = ("", "dashdot", "long")
+"""The dash patterns of the first, second and third engine of a colour; those of exact solutions, fits and guides are others."""
+
+NAMES = {
+    "wang": "Wang's method",
+    "mujoco": "MuJoCo",
+    "pybullet": "PyBullet",
+    "rapier": "Rapier",
+    "rapier-js": "Rapier (JavaScript)",
+    "jolt": "Jolt",
+    "havok": "Havok",
+    "dart": "DART",
+    "drake": "Drake",
+    "box3d": "Box3D",
+    "ode": "ODE",
+    "sapien": "SAPIEN",
+    "exudyn": "Exudyn",
+    "jsbsim": "JSBSim",
+    "mjx": "MJX",
+    "mujoco-warp": "MuJoCo Warp",
+    "newton": "Newton",
+    "genesis": "Genesis",
+}
+"""The names of engines as their authors write them; an engine that is not listed keeps the name by which commands take it."""
+OPTIONS = {"integrator=rk4": "RK4", "rotation=rk4": "RK4", "integrator=euler": "Euler", "profile=default": "default settings"}
+LABEL = re.compile(r"[^\[\]\s]+(\[[^\[\]]*\])?")
 
 
-def engine_styles(engines: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """A colour and a marker for each engine, by its label including options.
+class EngineStyle(NamedTuple):
+    """How the lines of an engine look: a colour, a marker of matplotlib and a dash pattern."""
 
-    The label alone determines them, in every plot and page. If two engines of a plot have the same colour, one of them gets the next
-    colour. Pairs repeat beyond 40 engines.
+    colour: str
+    marker: str
+    dashes: Dashes
+
+
+def engine_styles(engines: Sequence[str]) -> dict[str, EngineStyle]:
+    """A style for each engine, by its label including options.
+
+    The label alone determines colour and marker, in every plot and page. If two engines of a plot have the same colour, one of them gets
+    the next one of those that the fewest have; if no colour is left, its line has a dash pattern. Pairs of colour and marker repeat beyond
+    48 engines.
     """
-    styles = {engine: KNOWN[engine] for engine in engines if engine in KNOWN}
+    styles = {engine: EngineStyle(*KNOWN[engine], "") for engine in engines if engine in KNOWN}
     for engine in sorted(set(engines) - set(KNOWN)):
         first = crc32(engine.encode("utf-8", "surrogatepass")) % len(STYLES)
         candidates = [*STYLES[first:], *STYLES[:first]]
-        taken_colours = {colour for colour, _ in styles.values()}
-        unused = [style for style in candidates if style not in styles.values()]
-        styles[engine] = next((style for style in unused if style[0] not in taken_colours), (unused or candidates)[0])
+        colours = [style.colour for style in styles.values()]
+        pairs = {style[:2] for style in styles.values()}
+        unused = [style for style in candidates if style not in pairs]
+        colour, marker = min(unused or candidates, key=lambda style: colours.count(style[0]))
+        styles[engine] = EngineStyle(colour, marker, REPEATED[colours.count(colour) % len(REPEATED)])
     return {engine: styles[engine] for engine in engines}
 
 
 def engine_colours(engines: Sequence[str]) -> dict[str, str]:
     """The colour of each engine, from `engine_styles`."""
-    return {engine: colour for engine, (colour, _) in engine_styles(engines).items()}
+    return {engine: style.colour for engine, style in engine_styles(engines).items()}
+
+
+def human_label(label: str) -> str:
+    """An engine and its options as a reader writes them: `MuJoCo, RK4` for `mujoco[integrator=rk4]`; any other text unchanged."""
+    if not LABEL.fullmatch(label):
+        return label
+    name, options = parts_of(label)
+    return ", ".join([NAMES.get(name, name.rpartition(":")[2]), *map(_in_words, options)])
+
+
+def _in_words(option: str) -> str:
+    name, _, value = option.partition("=")
+    return OPTIONS.get(option) or f"{name.replace('_', ' ')} {re.sub('-(?=[0-9.])', '−', value)}"

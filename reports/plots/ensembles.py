@@ -35,7 +35,7 @@ def rest_of_ensemble(results: Results, scene_name: str) -> Chart:
         rested = np.sort(outcome.rest_time[outcome.rest_time < outcome.t[-1]])
         x = np.concatenate([[0.0], rested, [duration]])
         share = np.arange(len(rested) + 1) / len(outcome.rest_time)
-        lines.append(Line(x=x, y=np.append(share, share[-1]), **style | {"marker": ""}, is_step=True))
+        lines.append(Line(x=x, y=np.append(share, share[-1]), **style, is_step=True))
     return Chart(TIME, "fraction at rest", lines, x_range=(0.0, duration))
 
 
@@ -58,4 +58,4 @@ def plot_rest_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> No
 def _spread(t: Array, values: Array, style: dict[str, Any]) -> Line:
     every = stride(len(t))
     low, middle, high = np.quantile(values[:, ::every], [0.1, 0.5, 0.9], axis=0)
-    return Line(x=t[::every], y=middle, low=low, high=high, **style | {"marker": ""})
+    return Line(x=t[::every], y=middle, low=low, high=high, **style)

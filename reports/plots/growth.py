@@ -43,7 +43,7 @@ def error_growth(results: Results, scene_name: str, metric: str) -> Chart:
     lines = []
     for motion, style in at_one_step(results, results.trajectories, scene_name, min):
         t, sizes = _sizes(scene, motion, truth, metric)
-        lines.append(Line(x=t, y=sizes, **style | {"marker": ""}))
+        lines.append(Line(x=t, y=sizes, **style))
     return Chart(TIME, metric_label(metric), lines, y_log=True, rounding=TRUTH_ACCURACY * scale(scene, METRICS[metric].unit))
 
 

@@ -6,18 +6,19 @@ import numpy as np
 
 from dropspin.comparisons.regressions.comparing import History
 from dropspin.reports.plots.chart import Chart, Line, draw
-from dropspin.reports.plots.colours import engine_colours
-from dropspin.reports.plots.style import metric_label, thinner
+from dropspin.reports.plots.colours import engine_styles
+from dropspin.reports.plots.style import metric_label, plain
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+CHANGED = "changed by more than its tolerance"
 LONGEST_LABEL = 22
 
 
 def result_over_runs(history: History, scene_name: str, metric: str) -> Chart:
-    """The absolute value of a metric at the finest time step over the runs, logarithmic; a square marks each run in which it changed.
+    """The absolute value of a metric at the finest time step over the runs, logarithmic; a cross marks each run in which it changed.
 
     Args:
         history: The runs.
@@ -32,15 +33,15 @@ def result_over_runs(history: History, scene_name: str, metric: str) -> Chart:
 
     results = of(history.results)
     steps = min(results["steps"], key=float)
-    colours, lines = engine_colours(list(dict.fromkeys(history.results["engine"]))), []
-    for number, (engine, colour) in enumerate(colours.items()):
+    lines = []
+    for engine, (colour, marker, dashes) in engine_styles(list(dict.fromkeys(history.results["engine"]))).items():
         mine = results[(results["engine"] == engine) & (results["steps"] == steps)].sort_values("run")
         moved = [move.run for move in history.moves if move.engine == engine and (of(move.results)["steps"] == steps).any()]
         runs, sizes = mine["run"].to_numpy(float), mine["value"].abs().to_numpy(float)
         has_moved = np.isin(runs, moved)
-        lines.append(Line(engine, runs, sizes, colour, thinner(number, len(colours)), marker="o"))
-        lines.append(Line(engine, runs[has_moved], sizes[has_moved], colour, 0.0, marker="s"))
-    label = f"{metric_label(metric)}\nat {1e3 * float(steps):g} ms"
+        lines.append(Line(engine, runs, sizes, colour, dashes=dashes, marker=marker))
+        lines.append(Line(CHANGED, runs[has_moved], sizes[has_moved], width=0.0, marker="X"))
+    label = f"{metric_label(metric)}\nat {plain(1e3 * float(steps))} ms"
     return Chart("run", label, [line for line in lines if len(line.x)], y_log=True, ticks=list(enumerate(run_labels(history))))
 
 

@@ -8,6 +8,7 @@ from dropspin.comparisons.robustness.axes import Axis
 from dropspin.comparisons.robustness.failure_modes import FAILURE_MODES
 from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy
 from dropspin.reports.plots.chart import Chart, Line, draw
+from dropspin.reports.plots.style import plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,4 +82,4 @@ def _ticks(axis: Axis, values: list[float]) -> list[tuple[float, str]]:
     else:
         powers = range(int(np.ceil(np.log10(low))), int(np.floor(np.log10(high))) + 1)
         ticks = [10.0**power for power in powers if len(powers) <= 6 or power % 3 == 0]
-    return [(axis.coordinate(tick), f"{tick:g}".replace("e-0", "e-").replace("e+0", "e")) for tick in ticks]
+    return [(axis.coordinate(tick), plain(tick)) for tick in ticks]

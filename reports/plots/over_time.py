@@ -1,6 +1,7 @@
 """Quantities of a motion over time, for each engine and for the exact solution or the recording."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -73,7 +74,7 @@ def over_time(results: Results, scene_name: str, quantity: Quantity) -> Chart:
     lines, times = [], np.linspace(0.0, scene.duration, MOST_POINTS)
     for motion, style in at_one_step(results, results.trajectories, scene_name, max):
         times = motion.t[:: stride(len(motion))]
-        lines.append(_drawn(Line(x=motion.t, y=quantity(scene, motion), **style | {"marker": ""}), times))
+        lines.append(_drawn(Line(x=motion.t, y=quantity(scene, motion), **style), times))
     if truth is not None:
         end = min(scene.duration, truth.horizon)
         exact = _sampled(truth, times, end) if truth.frames is None else truth(truth.frames[truth.frames <= end])
@@ -111,9 +112,9 @@ def _drawn(line: Line, times: Array) -> Line:
     missed = np.abs(np.interp(line.x, x, y) - line.y)[finite] > RESOLVED * reach
     constant = reach <= FLAT * float(np.abs(line.y[finite]).max(initial=0.0))
     if constant or not finite.any() or missed.mean() <= MOST_MISSED:
-        return Line(line.label, x, y, line.colour, line.width, line.dashes)
+        return replace(line, x=x, y=y)
     parts = np.split(line.y, shown[1:])
     low, high = (
         np.array([reduce(part) for part in parts]) for reduce in (np.fmin.reduce, np.fmax.reduce)
     )  # without NaN, as far as there is a number
-    return Line(line.label, x, 0.5 * (low + high), line.colour, line.width, line.dashes, low=low, high=high, is_fill=True)
+    return replace(line, x=x, y=0.5 * (low + high), marker="", is_sparse=False, low=low, high=high, is_fill=True)

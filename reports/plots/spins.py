@@ -61,9 +61,9 @@ def polhode(results: Results, scene_name: str) -> Chart:
     lines = [Line("energy ellipsoid", x, y, GREY, 0.5)]
     for path, style in paths:
         x, y = screen @ path.T
-        lines.append(Line(x=x, y=y, **style | {"marker": ""}))
+        lines.append(Line(x=x, y=y, **style | {"marker": "", "is_sparse": False}))
         if style.get("marker"):
-            lines.append(Line(x=x[-1:], y=y[-1:], **style | {"width": 0.0}))
+            lines.append(Line(x=x[-1:], y=y[-1:], **style | {"width": 0.0, "is_sparse": False}))
     signs = np.sign(towards)
     ends = (screen * LABEL_POSITION * signs * half_axes).T.tolist()
     texts = [(x, y, f"{'−' if sign < 0.0 else ''}ω{subscript}") for (x, y), sign, subscript in zip(ends, signs, SUBSCRIPTS, strict=True)]

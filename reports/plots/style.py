@@ -1,12 +1,12 @@
-"""The style of plots: line widths at which coinciding lines stay visible; axis labels with units."""
+"""The style of plots: sizes, looks, and axis labels with units."""
 
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import chdir
+from contextlib import chdir, contextmanager
 from importlib import import_module
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.colours import engine_styles
+from dropspin.scenarios.errors import UnknownName
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,18 +26,38 @@ Kept = TypeVar("Kept")
 ByStep = Mapping[tuple[str, str, float], Kept]
 """Trajectories or ensemble outcomes of a run, by scene, engine and time step."""
 
-REPORT: Any = {
+COMMON: Any = {
     "text.parse_math": False,  # dollar signs in names are text
-    "font.size": 9.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
-    "grid.color": "black",
     "grid.alpha": 0.15,
-    "axes.facecolor": "none",
-    "figure.facecolor": "none",
     "legend.frameon": False,
+    "figure.constrained_layout.use": True,
+    "pdf.fonttype": 42,  # TrueType; by default Type 3, which publishers refuse
+    "ps.fonttype": 42,
 }
+
+
+class Size(NamedTuple):
+    """The size of a figure: the width of a panel and its height [inches], how many are in a row, and the size of the font [points]."""
+
+    width: float
+    height: float
+    across: int
+    font: float
+
+
+SIZES = {"column": Size(3.4, 2.3, 1, 8.0), "page": Size(3.5, 2.4, 2, 9.0), "report": Size(3.7, 2.9, 3, 9.0)}
+"""Sizes of figures, by name: as wide as a column of a journal (86 mm), as a page (178 mm), and three panels in a row."""
+LOOKS: dict[str, list[Any]] = {
+    "light": [{"grid.color": "black"}],
+    "dark": ["dark_background"],
+    "grey": ["grayscale", {"grid.color": "black", "figure.facecolor": "white"}],
+}
+"""Looks of figures, by name: settings, and names of styles of matplotlib."""
+LINE = 1.5
+"""Width of the line of an engine [points], the same for all: a wider one would look more important."""
 TIME = "time [s]"
 """Label of every time axis; the replay marks its current time in plots with this label."""
 MOST_POINTS = 400
@@ -56,6 +77,35 @@ def load_matplotlib() -> None:
             import_module("matplotlib")
 
 
+@contextmanager
+def style(size: str = "column", look: str = "light") -> Iterator[None]:
+    """Within `with plots.style(...)`, figures have the font and the size of a figure in a talk or a paper, and embed TrueType fonts.
+
+    Args:
+        size: `column` (86 mm wide) or `page` (178 mm wide).
+        look: `light`, `dark`, or `grey` for print without colours.
+
+    Raises:
+        UnknownName: The size or the look is unknown.
+    """
+    for what, name, names in (("size of a figure", size, SIZES), ("look of a figure", look, LOOKS)):
+        if name not in names:
+            raise UnknownName(what, name, list(names))
+    load_matplotlib()
+    from matplotlib import style as matplotlib_style
+
+    width, height, across, font = SIZES[size]
+    with matplotlib_style.context(["default", *LOOKS[look], COMMON, {"figure.figsize": (across * width, height), "font.size": font}]):
+        yield
+
+
+def is_grey() -> bool:
+    """Whether the current matplotlib style has no colours, as its style `grayscale`."""
+    from matplotlib import rcParams
+
+    return str(rcParams["image.cmap"]) == "gray"
+
+
 def ink() -> str:
     """The text colour of the current matplotlib style, for elements that belong to no engine."""
     from matplotlib import rcParams
@@ -68,11 +118,6 @@ def stride(length: int) -> int:
     return max(1, -(-length // MOST_POINTS))
 
 
-def thinner(number: int, count: int) -> float:
-    """The width of the line of an engine by its number [points], so that later lines do not hide coinciding earlier ones."""
-    return float(np.linspace(3.8, 1.2, max(count, 2))[number])
-
-
 def step_of(kept: ByStep[Kept], scene_name: str, which: Callable[..., float]) -> float:
     """The finest or coarsest time step, by `min` or `max`, for which there is an entry of the scene [s]; 0 if there is none."""
     return which((dt for name, _, dt in kept if name == scene_name), default=0.0)
@@ -81,14 +126,12 @@ def step_of(kept: ByStep[Kept], scene_name: str, which: Callable[..., float]) ->
 def at_one_step(
     results: Results, kept: ByStep[Kept], scene_name: str, which: Callable[..., float]
 ) -> Iterator[tuple[Kept, dict[str, Any]]]:
-    """For each engine, the entry at the time step of `step_of`, and the label, colour, marker and width of its line."""
-    dt, count = step_of(kept, scene_name, which), len(results.engines)
-    styles = engine_styles(results.engines)
-    for number, engine in enumerate(results.engines):
-        found = kept.get((scene_name, engine, dt))
-        if found is not None:
-            colour, marker = styles[engine]
-            yield found, {"label": engine, "colour": colour, "marker": marker, "width": thinner(number, count)}
+    """For each engine, the entry at the time step of `step_of`, and the label, colour, marker and dash pattern of its line."""
+    dt = step_of(kept, scene_name, which)
+    for engine, engine_style in engine_styles(results.engines).items():
+        entry = kept.get((scene_name, engine, dt))
+        if entry is not None:
+            yield entry, {"label": engine, **engine_style._asdict(), "is_sparse": True}
 
 
 def metric_label(metric: str) -> str:
@@ -118,8 +161,14 @@ def label_powers(axes: "Axes", name: str) -> None:
     axis.set_minor_locator(NullLocator())
 
 
+def plain(value: float) -> str:
+    """A number of up to four digits, with a minus sign: 0.25, −1; as 6.358×10⁻⁴ below 0.001 and from 10,000 on."""
+    is_short = value == 0.0 or 1e-3 <= abs(value) < 1e4
+    return (f"{value:.4g}" if is_short else power(value)).replace("-", "−")
+
+
 def power(value: float) -> str:
     """A number as 10⁻³ or 2.5×10⁻³."""
-    digits, exponent = f"{value:.2e}".split("e")
+    digits, exponent = f"{value:.3e}".split("e")
     power_of_ten = "10" + str(int(exponent)).translate(SUPERSCRIPTS)
     return power_of_ten if float(digits) == 1.0 else f"{float(digits):g}×{power_of_ten}"

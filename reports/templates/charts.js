@@ -7,7 +7,8 @@
   const [CHARACTER, BESIDE] = [6.2, 30];  // pixels: the width of a digit of a tick, and the room for the name of the axis
   const NEAR = 40;           // pixels within which a point has its values shown
   const SHORTEST_DRAG = 6;   // pixels; anything shorter is a click
-  const DASHES = { dashed: "4 3", dotted: "1 3" };
+  const DASHES = { dashed: "4 3", dotted: "1 3", dashdot: "7 3 1 3", long: "11 3" };
+  const BETWEEN_MARKERS = 90;  // pixels along a line whose markers are sparse
   const MARKERS = {
     o: "M-3.2,0a3.2,3.2 0 1,0 6.4,0a3.2,3.2 0 1,0 -6.4,0", s: "M-3,-3h6v6h-6z", D: "M0,-4l4,4l-4,4l-4,-4z", "^": "M0,-4l4,7h-8z",
     v: "M0,4l4,-7h-8z", P: "M-1.3,-4h2.6v2.7h2.7v2.6h-2.7v2.7h-2.6v-2.7h-2.7v-2.6h2.7z", X: "M-3.5,-3.5l7,7M-3.5,3.5l7,-7",
@@ -62,7 +63,7 @@
   };
 
   // The label of a row: a long one has a line for the engine and one for each option.
-  const linesOf = (text) => (text.length > 22 && text.includes("[") ? text.split(/(?=\[)|(?<=,)/) : [text]);
+  const linesOf = (text) => (text.length > 22 ? text.split(/(?<=,) /) : [text]);
 
   class Chart {
     constructor(home, raw, section, engines) {
@@ -119,7 +120,7 @@
     entry(label) {
       const line = this.lines.find((one) => one.label === label), swatch = drawn("svg", { width: 22, height: 10, "aria-hidden": "true" });
       swatch.append(...this.strokes(line, "M1,5H21", [[11, 5]]));
-      const button = made("button", { type: "button", "aria-pressed": "true", title: "Hide or show; with Shift: this one alone" }, swatch, label);
+      const button = made("button", { type: "button", "aria-pressed": "true", title: "Hide or show; with Shift: this one alone" }, swatch, line.name ?? label);
       button.dataset.label = label;
       button.addEventListener("click", (event) => {
         if (event.shiftKey) {
@@ -246,10 +247,22 @@
         const there = line.x.map((_, i) => i).filter((i) => Number.isFinite(line.low[i]) && Number.isFinite(line.high[i]));
         const edge = (band, rows) => rows.map((i) => `${this.toX(line.x[i]).toFixed(1)},${scaled(band[i])}`).join("L");
         const band = `M${edge(line.high, there)}L${edge(line.low, [...there].reverse())}Z`;
-        if (there.length) parts.push(drawn("path", { d: band, fill: line.colour || "currentColor", "fill-opacity": 0.2, stroke: "none", "data-label": line.label }));
+        if (there.length) parts.push(drawn("path", { d: band, fill: line.colour || "currentColor", "fill-opacity": 0.15, stroke: line.isEnvelope ? line.colour || "currentColor" : "none", "data-label": line.label }));
       }
-      if (!line.isEnvelope) parts.push(...this.strokes(line, d, points));
+      if (!line.isEnvelope) parts.push(...this.strokes(line, d, line.sparse ? this.thinned(line, points) : points));
       return parts;
+    }
+
+    // A few of the points, at other places for each line, so that the markers of lines that coincide are all visible.
+    thinned(line, points) {
+      const sparse = this.lines.filter((one) => one.sparse);
+      let left = (sparse.indexOf(line) + 0.5) / sparse.length * BETWEEN_MARKERS;
+      return points.filter((point, i) => {
+        left -= i ? Math.hypot(point[0] - points[i - 1][0], point[1] - points[i - 1][1]) : 0;
+        const isMarked = left <= 0;
+        if (isMarked) left = BETWEEN_MARKERS;
+        return isMarked;
+      });
     }
 
     strokes(line, d, points) {
@@ -308,7 +321,7 @@
       const place = this.raw.ticks?.find(([v]) => Math.abs(v - x) <= 1e-9 * Math.abs(x))?.[1] ?? shown(x, 4);
       const rows = this.visible.flatMap((one) => {
         const at = one === line ? i : one.x.findIndex((v) => Math.abs(v - x) <= 1e-9 * Math.abs(x));
-        return at < 0 || !Number.isFinite(one.y[at]) || (one !== line && one.dashes === "dashed" && one.colour) ? [] : [made("div", one === line ? { class: "chosen" } : {}, `${one.label}: ${text(one, at)}`)];
+        return at < 0 || !Number.isFinite(one.y[at]) || (one !== line && one.dashes === "dashed" && one.colour) ? [] : [made("div", one === line ? { class: "chosen" } : {}, `${one.name ?? one.label}: ${text(one, at)}`)];
       });
       this.tip.replaceChildren(made("div", { class: "quiet" }, `${(this.raw.xLabel ?? "").replace(/ \[.*/, "")} ${place}`), ...rows);
       const right = this.toX(x) > this.frame.width / 2;

@@ -63,12 +63,12 @@ def test_hover_shows_the_value_of_the_run(chart, results):
     motion = results.trajectories["drop-box-corner", "mujoco", DT]
     values = energy(results.scenes["drop-box-corner"], motion)
     row = 100
-    one.press("wang")
+    one.press("Wang's method")
     one.press("exact solution")
     x, y = one.at(motion.t[row], values[row])
     one.mouse.move(x + 1, y + 2)
     tip = one.home.locator(".tip").inner_text()
-    assert f"mujoco: {values[row]:.4g}" in tip
+    assert f"MuJoCo: {values[row]:.4g}" in tip
     assert f"time {motion.t[row]:.4g}" in tip
     spot = one.home.locator(".spot circle").bounding_box()
     centre = (spot["x"] + spot["width"] / 2, spot["y"] + spot["height"] / 2)
@@ -94,12 +94,12 @@ def test_legend_hides_and_isolates(chart):
     one = chart("drop-box-corner", "height [m]")
     every = {*ENGINES, "exact solution"}
     assert one.lines() == every
-    one.press("mujoco")
+    one.press("MuJoCo")
     assert one.lines() == every - {"mujoco"}
-    one.press("mujoco")
-    one.press("wang", modifiers=["Shift"])
+    one.press("MuJoCo")
+    one.press("Wang's method", modifiers=["Shift"])
     assert one.lines() == {"wang"}
-    one.press("wang", modifiers=["Shift"])
+    one.press("Wang's method", modifiers=["Shift"])
     assert one.lines() == every
 
 
@@ -119,7 +119,7 @@ def test_difference_from_the_exact_solution(chart, results):
 def test_logarithmic_axis_can_be_switched(chart):
     """Errors over the step: equal ratios have equal distances on a logarithmic axis, equal differences on a linear one."""
     one = chart("drop-box-corner", "bounce height error")
-    one.press("mujoco", modifiers=["Shift"])
+    one.press("MuJoCo", modifiers=["Shift"])
     errors = one.get("Array.from(chart.lines.find((line) => line.label === 'mujoco').y)")
     for function in (np.log10, np.asarray):
         screen = one.path("mujoco")[:, 1]
@@ -135,7 +135,7 @@ def test_filter_of_engines_acts_on_plots_and_replay(opened):
     page.start_replays()
     page.tab.get_by_role("checkbox", name="mujoco", exact=True).first.uncheck()
     assert "mujoco" not in one.lines()
-    assert not one.home.get_by_role("button", name="mujoco", exact=True).is_visible()
+    assert not one.home.get_by_role("button", name="MuJoCo", exact=True).is_visible()
     shown = page.tab.evaluate(
         "document.querySelector('[data-scene=drop-box-corner] [data-replay]').viewer.motions.map((motion) => [motion.label, motion.shown])"
     )

@@ -63,7 +63,7 @@ def test_scene_has_a_marker_for_each_engine_and_time_step_with_its_ranges(opened
     drawn = tab.locator(".plot path[data-label=mujoco]")
     shapes = drawn.evaluate_all("all => all.map(one => one.getAttribute('d'))")
     assert sum(shape.count("M") for shape in shapes) > 4  # the line, two markers, two bars at each of two time steps
-    legend = tab.locator("#errors, .legend").get_by_text("mujoco[profile=default]")
+    legend = tab.locator("#errors, .legend").get_by_text("MuJoCo, default settings")
     assert legend.count() == 1
     tab = opened("engine-mujoco.html").tab
     assert tab.get_by_text(HOSTILE).count() > 0

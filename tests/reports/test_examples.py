@@ -11,7 +11,7 @@ import pytest
 import dropspin as ds
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = {"examples": 11, "measured": 1, "note": 4}
+PAGES = {"examples": 13, "measured": 1, "note": 4}
 """The number of pictures of each page."""
 
 

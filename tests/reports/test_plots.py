@@ -13,7 +13,7 @@ from dropspin.reports import plots
 from dropspin.reports.plots.colours import engine_styles
 from dropspin.reports.plots.figures import ensemble_charts
 from dropspin.reports.plots.spins import energy_ellipsoid, polhode_paths
-from dropspin.reports.plots.style import power
+from dropspin.reports.plots.style import plain, power
 from dropspin.scenarios import Trajectory, members, truth_for
 from dropspin.scenarios.mechanics import energy, kinetic_energy
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
@@ -40,7 +40,7 @@ def axes_of():
 
 def line(axes, label):
     """The data of the line with a label."""
-    return next(one.get_data() for one in axes.get_lines() if one.get_label() == label)
+    return next(one.get_data() for one in axes.get_lines() if one.get_label() == plots.human_label(label))
 
 
 def spins_of(results, name):
@@ -254,14 +254,115 @@ def test_impacts_are_drawn_as_lines_and_not_as_envelopes():
 
 @pytest.mark.parametrize("count", [3, 9, 20, 40])
 def test_engines_have_colours_and_markers_of_their_own(count):
-    """Up to 40 engines differ in the pair, up to 8 besides the built-in ones in the colour; another set gives an engine the same style."""
+    """Up to 40 engines differ in colour and marker, up to 9 in the colour besides the built-in ones; more have dash patterns."""
     labels = [f"wang[rotation={number}]" for number in range(count - 1)]
     styles = engine_styles(["mujoco", *labels])
-    assert len(set(styles.values())) == count
-    if count <= 9:
-        assert len({colour for colour, _ in styles.values()}) == count
+    assert len({style[:2] for style in styles.values()}) == count
+    assert len({style.colour for style in styles.values()}) == min(count, 10)
+    assert any(style.dashes for style in styles.values()) == (count > 10)
     assert engine_styles(["mujoco"])["mujoco"] == engine_styles(["pybullet", "mujoco"])["mujoco"] == styles["mujoco"]
     assert engine_styles([labels[0]])[labels[0]] == engine_styles(["mujoco", labels[0]])[labels[0]]
+
+
+@pytest.mark.parametrize(
+    ("label", "name"),
+    [
+        ("mujoco[integrator=rk4]", "MuJoCo, RK4"),
+        ("wang[rotation=gyroscopic]", "Wang's method, rotation gyroscopic"),
+        ("mujoco[profile=default,solref=-1000 0]", "MuJoCo, default settings, solref −1000 0"),
+        ("my_module:MyEngine[precision=float32]", "MyEngine, precision float32"),
+        ("my-engine", "my-engine"),
+        ("exact solution", "exact solution"),
+        ("mujoco[integrator=rk4], mirrored", "mujoco[integrator=rk4], mirrored"),
+    ],
+)
+def test_labels_name_engines_as_their_authors_do(label, name):
+    assert plots.human_label(label) == name
+
+
+@pytest.fixture
+def lines_of():
+    """Charts with a horizontal line at each of some heights, which end at 1 but for the first."""
+
+    def chart(*heights, end=1.0):
+        ends = [end, *[1.0] * (len(heights) - 1)]
+        return plots.Chart(
+            "x", "y", [plots.Line(f"at {y}", np.array([0.0, x]), np.full(2, y), "#0072B2") for y, x in zip(heights, ends, strict=True)]
+        )
+
+    return chart
+
+
+def test_single_chart_has_labels_at_the_ends_of_lines_where_they_fit(lines_of):
+    """Each at the height of its line, or moved by less than two lines of text where lines are close; else there is a legend."""
+    figure = plots.figure_of([lines_of(0.0, 0.5, 1.0)], "column")
+    [axes] = figure.axes
+    figure.draw_without_rendering()
+    places = {text.get_text(): text.get_window_extent() for text in axes.texts}
+    for y in (0.0, 0.5, 1.0):
+        box = places[f"at {y}"]
+        assert 0.5 * (box.y0 + box.y1) == pytest.approx(axes.transData.transform((1.0, y))[1], abs=4.0)
+        assert box.x0 > axes.bbox.x1
+        assert box.x1 < figure.bbox.x1
+    near = plots.figure_of([lines_of(0.0, 0.01, 1.0)], "column").axes[0]
+    low, high, _ = (text.get_window_extent() for text in near.texts)
+    assert low.y1 <= high.y0 + 1.0
+    long = plots.Chart("x", "y", [plots.Line("a label of more than a quarter of a column", np.arange(2.0), np.zeros(2))])
+    for crowded in (lines_of(0.0, 0.001, 0.002, 0.003, 0.004, 1.0), lines_of(0.0, 1.0, end=0.5), long):
+        figure = plots.figure_of([crowded], "column")
+        assert not figure.axes[0].texts
+        assert len(figure.legends) == 1
+
+
+@pytest.mark.parametrize(("size", "inches"), [("column", 3.4), ("page", 7.0)])
+def test_legend_is_within_the_figure(lines_of, size, inches):
+    """Also if labels are long; one panel of rows, as of a study of limits, and several."""
+    long = [
+        plots.Line(f"a label of an engine with several options, {number}", np.arange(2.0), np.full(2, 0.0), "#0072B2", 9.0)
+        for number in range(6)
+    ]
+    for charts in ([plots.Chart("x", "", long, rows=["a"])], [lines_of(0.0, 1.0), plots.Chart("x", "y", long)]):
+        figure = plots.figure_of(charts, size)
+        assert figure.get_size_inches()[0] == inches
+        figure.draw_without_rendering()
+        box = figure.legends[0].get_window_extent()
+        assert box.x0 >= 0.0
+        assert box.y1 <= figure.bbox.y1 + 1.0
+        assert box.x1 <= figure.bbox.x1 or size == "column"
+        assert box.y0 >= max(axes.bbox.y1 for axes in figure.axes)
+
+
+def test_grey_figures_have_no_colour_and_dark_ones_white_text(lines_of):
+    chart = lines_of(*np.linspace(0.0, 1.0, 6))
+    for look in ("grey", "dark"):
+        figure = plots.figure_of([chart], "column", look)
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format="rgba", facecolor=figure.get_facecolor())
+        pixels = np.frombuffer(buffer.getvalue(), np.uint8).reshape(-1, 4)[:, :3]
+        assert (np.ptp(pixels, axis=1).max() == 0) == (look == "grey")
+        assert np.median(pixels) == (255 if look == "grey" else 0)
+        if look == "grey":
+            assert len({(line.get_color(), line.get_linestyle()) for line in figure.axes[0].get_lines()}) == 6
+    with pytest.raises(ds.DropspinError, match="Did you mean 'grey'"), plots.style("column", "gray"):
+        pass
+
+
+def test_pdf_has_truetype_fonts_and_no_time(lines_of, tmp_path):
+    for name in ("a.pdf", "b.pdf"):
+        plots.save_figure(plots.figure_of([lines_of(-1.0, 1.0)]), tmp_path / name)
+    content = (tmp_path / "a.pdf").read_bytes()
+    assert content == (tmp_path / "b.pdf").read_bytes()
+    assert b"/CIDFontType2" in content  # TrueType
+    assert b"/Type3" not in content
+
+
+def test_data_of_charts_is_saved_with_all_digits(lines_of, tmp_path):
+    band = plots.Line("band", np.array([0.0, 0.1]), np.zeros(2), low=np.array([-1.0, -2.0]), high=np.array([1.0, 1 / 3]), is_fill=True)
+    plots.save_data([lines_of(1 / 3), plots.Chart("x", "y", [band])], tmp_path / "data.csv")
+    rows = (tmp_path / "data.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[0] == "chart,x_label,y_label,line,x,y,low,high"
+    assert rows[1] == f"1,x,y,at {1 / 3},0.0,{1 / 3},,"
+    assert rows[4] == f"2,x,y,band,0.1,,-2.0,{1 / 3}"
 
 
 def test_ensembles_are_saved_and_drawn_in_three_panels(ensemble, tmp_path):
@@ -275,7 +376,8 @@ def test_ensembles_are_saved_and_drawn_in_three_panels(ensemble, tmp_path):
     assert len(plots.figure_of(ensemble_charts(loaded, name)).axes) == 3
 
 
-def test_powers_of_ten_are_plain_text():
+def test_numbers_are_plain_text_with_minus_signs():
+    assert [plain(value) for value in (0.0, 0.25, -1.0, 6.358e-4, 1e4)] == ["0", "0.25", "−1", "6.358×10⁻⁴", "10⁴"]
     assert [power(value) for value in (1.0, 1e-3, 2e-3, 5e12, 2.5e-11)] == ["10⁰", "10⁻³", "2×10⁻³", "5×10¹²", "2.5×10⁻¹¹"]
 
 

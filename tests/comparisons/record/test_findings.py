@@ -88,17 +88,20 @@ def test_digits():
 
 
 def test_performance_profiles_are_those_of_dolan_and_more():
-    """By hand: the ratios of the first are 1, 4, 1, those of the second 2, 1 and none, as it has no error in the third scene."""
-    found = profile({"one": [0.1, 0.4, 1e-12], "two": [0.2, 0.1, math.nan]})
+    """By hand: the ratios of the first are 1, 4, 1, those of the second 2, 1 and none, as it fails in the third scene."""
+    found = profile({"one": [0.1, 0.4, 1e-12], "two": [0.2, 0.1, math.inf]})
     assert found["one"][0] == pytest.approx([1.0, 4.0])
     assert found["one"][1] == pytest.approx([2 / 3, 1.0])
     assert found["two"][0] == pytest.approx([1.0, 2.0])
     assert found["two"][1] == pytest.approx([1 / 3, 2 / 3])
 
 
-def test_errors_within_rounding_are_equal_in_a_profile_and_a_scene_that_nobody_has_counts_for_nobody():
-    found = profile({"one": [1e-12, math.nan], "two": [0.9 * NEGLIGIBLE, math.nan]})
-    assert [(list(ratios), list(shares)) for ratios, shares in found.values()] == 2 * [([1.0], [0.5])]
+def test_profile_has_equal_rounding_errors_and_only_scenes_in_which_an_engine_was_measured():
+    found = profile({"one": [1e-12, math.nan], "two": [0.9 * NEGLIGIBLE, math.inf], "three": [math.nan, math.nan]})
+    assert {name: (list(ratios), list(shares)) for name, (ratios, shares) in found.items()} == {
+        "one": ([1.0], [1.0]),
+        "two": ([1.0], [0.5]),
+    }
 
 
 def row(scene=SCENE, **given):

@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 from threading import Event
 from typing import Any
 
-from dropspin.comparisons.engines.packages import is_npm
+from dropspin.comparisons.engines.packages import is_npm, numbers_of
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.running.processes import Closed
 from dropspin.comparisons.running.recording import Breakdown
@@ -40,8 +40,21 @@ def releases(package: str, oldest: str) -> list[str]:
     return listed[listed.index(oldest) :]
 
 
-def _pip_releases(package: str) -> list[str]:
-    code, output = run([sys.executable, "-m", "pip", "index", "versions", package], Event())
+def prereleases(package: str, newest: str) -> list[str]:
+    """The prereleases of a package after its newest release, oldest first: on npm, those that have a dist-tag such as `next`.
+
+    Raises:
+        DropspinError: As `releases`.
+    """
+    if not is_npm(package):
+        listed = _pip_releases(package, "--pre")
+        return listed[listed.index(newest) + 1 :]
+    tagged = {version for version in _npm_view(package, "dist-tags").values() if numbers_of(version) > numbers_of(newest)}
+    return sorted(tagged, key=lambda version: (numbers_of(version), version))
+
+
+def _pip_releases(package: str, *options: str) -> list[str]:
+    code, output = run([sys.executable, "-m", "pip", "index", "versions", package, *options], Event())
     found = re.search(r"^Available versions: (.+)$", output, re.MULTILINE)
     if code or found is None:
         raise DropspinError(f"pip cannot list the releases of {package}: {last_line(output)}; record needs pip, and access to its index.")
@@ -50,10 +63,15 @@ def _pip_releases(package: str) -> list[str]:
 
 def _npm_releases(package: str) -> list[str]:
     """Without prereleases."""
-    code, output = run([_npm(package), "view", package, "versions", "--json", "--loglevel=error"], Event())
+    return [name for name in _npm_view(package, "versions") if re.fullmatch(r"\d+(\.\d+)*", name)]
+
+
+def _npm_view(package: str, field: str) -> Any:
+    """What the index of npm has in a field of a package."""
+    code, output = run([_npm(package), "view", package, field, "--json", "--loglevel=error"], Event())
     if code:
         raise DropspinError(f"npm cannot list the releases of {package}: {last_line(output)}; its releases need access to npm's index.")
-    return [one for one in json.loads(output) if re.fullmatch(r"\d+(\.\d+)*", one)]
+    return json.loads(output)
 
 
 def _npm(package: str) -> str:

@@ -21,7 +21,7 @@ from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.measuring.tolerances import NEGLIGIBLE, scale, tolerance
 from dropspin.comparisons.record.plan import load_plan
-from dropspin.comparisons.record.store import MACHINE, OTHERS, OWN, Row, stored
+from dropspin.comparisons.record.store import MACHINE, OTHERS, OWN, Record, Row, machine, stored
 from dropspin.scenarios import DropspinError, load
 from dropspin.scenarios.loading import names
 
@@ -109,6 +109,13 @@ def read(folder: str | Path) -> dict[str, list[Release]]:
     if not any(release.cases for releases in found.values() for release in releases):
         raise DropspinError(f"{folder}: has no result of a scene as the catalogue defines it today; dropspin record measures them again.")
     return found
+
+
+def in_order(record: Record, engine: str, names: Iterable[str]) -> list[Release]:
+    """The releases of an engine that this machine measured, in the order of their names."""
+    here = machine()
+    files = [rows for name in names for _, rows in record.own(engine, name)]
+    return [release_of(rows) for rows in files if all(rows[0][name] == here[name] for name in MACHINE)]
 
 
 class Other(NamedTuple):

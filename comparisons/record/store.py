@@ -30,7 +30,7 @@ Row = Mapping[str, Any]
 OWN, OTHERS = "origin=own", "origin=unsigned"
 RELEASES = "_releases.json"
 HASH = 16
-NAME = re.compile(r"([a-z][a-z-]*)-(\w[\w.+!]*)-([0-9a-f]{16})\.parquet", re.ASCII)
+NAME = re.compile(r"([a-z][a-z-]*)-(\w[\w.+!-]*)-([0-9a-f]{16})\.parquet", re.ASCII)
 TEXTS = (
     *("engine", "release", "label", "profile", "scene", "scene_digest", "metric", "unit", "verdict", "reason", "trajectory"),
     *("adapter", "plan", "versions", "processor", "system", "python", "measured"),

@@ -1,6 +1,6 @@
 """Record releases: those that the record does not have yet, several at a time."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
@@ -12,7 +12,7 @@ from typing import Any
 
 from dropspin.comparisons.engines.adapter_code import built_in_code
 from dropspin.comparisons.engines.registry import BUILT_IN
-from dropspin.comparisons.record.environments import measured, releases
+from dropspin.comparisons.record.environments import measured, prereleases, releases
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.record.store import Record, machine
 from dropspin.comparisons.running.cluster import connected
@@ -27,11 +27,12 @@ def record(
     engines: Collection[str] = (),
     chosen: Collection[str] = (),
     *,
+    pre: bool = False,
     jobs: int,
     scheduler: str | None = None,
     time_limit: float,
     on_done: Callable[[str, int], None],
-) -> None:
+) -> dict[str, list[str]]:
     """Measure releases that the record does not have, and write each into it when it is measured.
 
     Args:
@@ -39,10 +40,15 @@ def record(
         plan: What to measure.
         engines: Names of engines; all by default.
         chosen: Releases; all by default.
+        pre: Whether prereleases may be chosen too. The default is then the newest release and the newest prerelease after it, of
+            engines that have one.
         jobs: How many to measure at a time on this machine.
         scheduler: The address of a Dask scheduler, on whose workers to measure instead.
         time_limit: Processor time that an engine may use for one simulation [s].
         on_done: Called after each release with its name and what became of it, and with the number that is left.
+
+    Returns:
+        The releases that were asked for of each engine, oldest first.
 
     Raises:
         DropspinError: There is no such engine or release, an index cannot be asked, the record cannot be written, or the scheduler does
@@ -50,15 +56,17 @@ def record(
     """
     verify_known("engine of the record", engines, plan.engines)
     listed = {engine: releases(own.package, own.oldest) for engine, own in plan.engines.items() if engine in (engines or plan.engines)}
-    verify_known("release", chosen, list(chain(*listed.values())))
+    after = {engine: prereleases(plan.engines[engine].package, names[-1]) if pre else [] for engine, names in listed.items()}
+    verify_known("release", chosen, list(chain(*listed.values(), *after.values())))
     record.write_releases(listed)
+    asked = {engine: _asked(names, after[engine], chosen, pre=pre) for engine, names in listed.items()}
     common = {engine: {"plan": plan.digest(engine), "adapter": _code(engine)} for engine in listed}
     with _workers(jobs, scheduler) as (workers, machines):
         pending = [
             (engine, release)
-            for engine, names in listed.items()
+            for engine, names in asked.items()
             for release in names
-            if (not chosen or release in chosen) and not any(record.has(engine, release, common[engine] | one) for one in machines)
+            if not any(record.has(engine, release, common[engine] | one) for one in machines)
         ]
         stopping, left = None if scheduler else Event(), len(pending)
         try:
@@ -72,6 +80,14 @@ def record(
         finally:
             if stopping is not None:
                 stopping.set()
+    return asked
+
+
+def _asked(names: Sequence[str], after: Sequence[str], chosen: Collection[str], *, pre: bool) -> list[str]:
+    """The releases to measure, of the releases of an engine and the prereleases after them."""
+    if chosen:
+        return [release for release in (*names, *after) if release in chosen]
+    return [names[-1], after[-1]] if after else [] if pre else list(names)
 
 
 @contextmanager

@@ -33,6 +33,18 @@ def test_releases_of_npm_are_those_from_the_oldest_on_without_prereleases(monkey
         environments.releases("@scope/engine", "0.8.0-alpha.0")
 
 
+def test_prereleases_are_those_after_the_newest_release(monkeypatch):
+    """On npm those with a dist-tag, which the index has for a prerelease of an earlier release too."""
+    tags = '{"latest": "0.10.0", "next": "0.11.0-beta.2", "canary": "0.11.0-alpha.7", "old": "0.10.0-rc.1"}'
+    monkeypatch.setattr(environments, "which", lambda name: name)
+    monkeypatch.setattr(environments, "run", lambda command, stopping: (0, tags))
+    assert environments.prereleases("@scope/engine", "0.10.0") == ["0.11.0-alpha.7", "0.11.0-beta.2"]
+    listed = "engine (1.1.0)\nAvailable versions: 1.2.0rc2, 1.2.0rc1, 1.1.0, 1.1.0rc1, 1.0.0\n"
+    monkeypatch.setattr(environments, "run", lambda command, stopping: (0, listed))
+    assert environments.prereleases("engine", "1.1.0") == ["1.2.0rc1", "1.2.0rc2"]
+    assert environments.prereleases("engine", "1.2.0rc2") == []
+
+
 def test_a_release_of_npm_is_installed_into_its_environment(monkeypatch):
     """There it is found before one in the working folder."""
 

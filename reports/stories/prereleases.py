@@ -1,0 +1,43 @@
+"""What changed in prereleases of engines: a note with a command for each engine that shows it."""
+
+from collections.abc import Mapping, Sequence
+from itertools import chain
+from typing import NamedTuple
+
+from dropspin.comparisons.record.findings import Release, changes
+from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences
+from dropspin.reports.stories.record import change_sentences
+from dropspin.scenarios.text import counted
+
+
+class Note(NamedTuple):
+    """The note, and whether a result changed or a release has no results."""
+
+    document: Document
+    has_changes: bool
+
+
+def prereleases(measured: Mapping[str, Sequence[Release]]) -> Note:
+    """The changes between the releases that were measured of each engine, oldest first."""
+    compared = {engine: releases for engine, releases in measured.items() if len(releases) > 1}
+    changed = [engine for engine, releases in compared.items() if _sentences(engine, releases)]
+    parts = [part for engine in changed for part in _of_engine(engine, compared[engine])]
+    alike = [f"{engine}: no result changed from {_names(compared[engine])}." for engine in compared if engine not in changed]
+    missing = [f"No prerelease after the newest release: {', '.join(engine for engine in measured if engine not in compared)}."]
+    title = f"{counted(len(changed), 'engine')} of {len(compared)} with a prerelease changed"
+    return Note(Document(title, [*parts, Sentences(alike + (missing if len(compared) < len(measured) else []))]), bool(changed))
+
+
+def _of_engine(engine: str, releases: Sequence[Release]) -> list[Part]:
+    chosen = " ".join(f"--release {release.name}" for release in releases)
+    heading = Heading(f"{engine}, from {_names(releases)}", on_terminal=True)
+    return [heading, Sentences(_sentences(engine, releases)), Paragraph("To show it:", f"dropspin record --pre -e {engine} {chosen}")]
+
+
+def _sentences(engine: str, releases: Sequence[Release]) -> list[str]:
+    without = [f"{release.name} has no results: {release.reason}" for release in releases if not release.cases]
+    return without + list(chain(*change_sentences(changes(engine, releases)).values()))
+
+
+def _names(releases: Sequence[Release]) -> str:
+    return " to ".join(release.name for release in releases)

@@ -101,14 +101,7 @@ def measured(plan: Plan, engine: str, release: str, time_limit: float, stopping:
     """
     own = plan.engines[engine]
     with TemporaryDirectory(prefix="dropspin-record-") as folder:
-        python = _environment(Path(folder))
-        if is_npm(own.package):
-            install = [_npm(own.package), "install", "--prefix", folder, "--no-save", "--ignore-scripts", "--no-audit", "--loglevel=error"]
-        else:
-            install = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-input", "--only-binary", ":all:"]
-        code, output = run([*install, *own.requirements(release)], stopping)
-        if code:
-            raise Breakdown("missing", f"not installable: {without_paths(last_line(output))}")
+        python = installed(Path(folder), own.package, own.requirements(release), stopping)
         request, answer = Path(folder, "request.json"), Path(folder, "answer.json")
         asked = {"package": own.package, "release": release, "labels": own.labels, "time_limit": time_limit}
         request.write_text(json.dumps(asked | {"scenes": plan.scenes_of(engine), "dts": plan.dts}), encoding="utf-8")
@@ -119,6 +112,38 @@ def measured(plan: Plan, engine: str, release: str, time_limit: float, stopping:
     for row in found["rows"]:
         row["reason"] = without_paths(row["reason"])
     return found
+
+
+def installed(folder: Path, package: str, requirements: Sequence[str], stopping: Event) -> str:
+    """Make a virtual environment, and install a release of an engine into it.
+
+    Args:
+        folder: Where; it may exist, and is then empty.
+        package: The name of the engine's package on PyPI or npm.
+        requirements: What pip or npm installs, such as `mujoco==4.0.0`.
+        stopping: Once it is set, everything ends.
+
+    Returns:
+        The path of its Python.
+
+    Raises:
+        Breakdown: It cannot be installed here, which may be possible another day (`missing`).
+        Closed: `stopping` was set.
+    """
+    python = _environment(folder)
+    if is_npm(package):
+        install = [_npm(package), "install", "--prefix", str(folder), "--no-save", "--ignore-scripts", "--no-audit", "--loglevel=error"]
+    else:
+        install = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-input", "--only-binary", ":all:"]
+    code, output = run([*install, *requirements], stopping)
+    if code:
+        raise Breakdown("missing", f"not installable: {without_paths(last_line(output))}")
+    return python
+
+
+def python_of(folder: Path) -> str:
+    """The path of the Python of an environment."""
+    return str(venv.EnvBuilder(symlinks=True).ensure_directories(folder).env_exe)
 
 
 def _environment(folder: Path) -> str:

@@ -21,7 +21,7 @@ GROUPS = {
     "Judge": ("check", "accept", "compare", "compare history"),
     "Study": ("tradeoff", "limits", "symmetries", "symmetries twins", "sweep", "reproduce"),
     "Write an adapter": ("new-adapter", "conform"),
-    "Maintain": ("record", "record rerun", "record publish", "doctor"),
+    "Maintain": ("record", "record rerun", "record publish", "bugs", "doctor"),
 }
 COMMANDS = [name for group in GROUPS.values() for name in group]
 """The commands, each in `reports/commands/`, in a file of its name with `_` for `-` and for spaces."""

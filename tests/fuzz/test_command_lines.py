@@ -50,7 +50,7 @@ LIMITS = {"resources": ["1", "0.5", "1e8"], "budget": ["0.1", "0.05", "1e8"]}
 ALWAYS = {"run": ["--time-limit", "1"], "sweep": ["--time-limit", "1"], "limits": ["--time-limit", "1", "--axis", "step"]}
 ALWAYS |= {"tradeoff": ["--budget", "0.1"], "conform": ["--time-limit", "1"], "replay": ["--no-open"], "record": ["--merge=run"]}
 """Options without which a command takes minutes, opens a browser or uses the network."""
-SLOW_WITHOUT = ("run", "limits", "tradeoff", "reproduce")
+SLOW_WITHOUT = ("run", "limits", "tradeoff", "reproduce", "bugs")
 """Commands that take long without an argument."""
 WRITTEN = ("--output", "--baseline", "--junit", "--summary", "--gif")
 

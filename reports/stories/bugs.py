@@ -1,0 +1,105 @@
+"""The output of `dropspin bugs`: each public report with what its releases did, and the verdicts on all."""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.record.bugs import Bug, Outcome, Verdict, verdict
+from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
+from dropspin.reports.stories.numbers import formatted, in_ms, quantity, unit
+from dropspin.reports.stories.study import Study
+from dropspin.scenarios.text import counted
+
+FEW = 4
+"""Number of reports up to which a terminal shows each of them."""
+
+
+class KnownBugs(Study):
+    """What `dropspin bugs` found, report by report."""
+
+    study: Literal["bugs"] = "bugs"
+    bugs: list[Bug]
+    outcomes: dict[str, list[Outcome]]
+
+    def verdicts(self) -> list[tuple[Bug, Verdict]]:
+        """The verdict on each report."""
+        return [(bug, verdict(bug, self.outcomes[bug.name])) for bug in self.bugs]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each release of each report; one for a report without a release."""
+        blank = Outcome(release="", state="not run")
+        return [
+            {"case": bug.name, "kind": bug.kind, "reference": bug.reference, "command": bug.command if bug.label else ""}
+            | {"metric": bug.metric, "verdict": words(bug, found)}
+            | outcome.model_dump()
+            for bug, found in self.verdicts()
+            for outcome in self.outcomes[bug.name] or [blank]
+        ]
+
+    def document(self) -> Document:
+        """Each report with its releases, and a table of all."""
+        found = self.verdicts()
+        parts: list[Part] = []
+        for bug, outcome in found:
+            parts += _of_bug(bug, outcome, self.outcomes[bug.name], on_terminal=len(self.bugs) <= FEW)
+        table = [{"case": bug.name, "engine": bug.engine or "–", "verdict": words(bug, outcome)} for bug, outcome in found]
+        parts += [Heading("All cases"), Table(table), Paragraph(_summary(found))]
+        return Document("Known bugs", parts)
+
+
+def _of_bug(bug: Bug, found: Verdict, outcomes: Sequence[Outcome], *, on_terminal: bool) -> list[Part]:
+    """One report."""
+    parts: list[Part] = [
+        Heading(f"{bug.name}: {bug.kind}", on_terminal=on_terminal),
+        Paragraph(f"{bug.symptom}. Reported in {bug.year}: {bug.reference}", on_terminal=on_terminal),
+    ]
+    if bug.label:
+        parts += [
+            Paragraph(f"Closed form: {bug.closed_form}.", on_terminal=on_terminal),
+            Paragraph("Shown by:", bug.command, on_terminal=on_terminal),
+            Table([_row(bug, outcome) for outcome in outcomes], on_terminal=on_terminal),
+            Sentences(_said(bug, outcomes), on_terminal=on_terminal),
+        ]
+    return [*parts, Paragraph(f"Verdict: {words(bug, found)}.", style="bold", on_terminal=on_terminal)]
+
+
+def _row(bug: Bug, outcome: Outcome) -> dict[str, str]:
+    metric = f"{quantity(bug.metric)} error{unit(METRICS[bug.metric].unit)} at {in_ms(bug.dt)}"
+    value = "–" if math.isnan(outcome.value) else formatted(outcome.value)
+    return {"release": f"{bug.engine} {outcome.release}", metric: value, "fault": outcome.state}
+
+
+def _said(bug: Bug, outcomes: Sequence[Outcome]) -> list[str]:
+    """What the command printed in the newest release that shows the fault, or why nothing; and why releases were not run."""
+    shown = [outcome for outcome in outcomes if outcome.state == "shown"]
+    printed = [f"dropspin says: {shown[-1].said}" if shown[-1].said else "dropspin says nothing about it."] if shown else []
+    silent = [f"Not by the unchanged catalogue: {bug.silent}."] if bug.silent else []
+    return [*printed, *silent, *(f"{outcome.release}: {outcome.said}." for outcome in outcomes if outcome.state == "not run")]
+
+
+def words(bug: Bug, found: Verdict) -> str:
+    """A verdict in words."""
+    if found.kind == "fixed":
+        return f"no longer occurs since {found.since}"
+    return f"not expressible: {bug.why_not}" if found.kind == "not expressible" else found.kind
+
+
+def _summary(found: Sequence[tuple[Bug, Verdict]]) -> str:
+    """How many reports have which verdict."""
+    kinds = Counter(verdict.kind for _, verdict in found)
+    catalogue = sum(verdict.kind in ("shown", "fixed") and not bug.silent for bug, verdict in found)
+    parts = {
+        "shown": kinds["shown"] + kinds["fixed"],
+        "of these fixed in a later release": kinds["fixed"],
+        "by the unchanged catalogue": catalogue,
+    }
+    others = {kind: kinds[kind] for kind in ("not shown", "not expressible", "not run") if kinds[kind]}
+    return f"{counted(len(found), 'case')}: {', '.join(f'{count} {what}' for what, count in (parts | others).items())}."
+
+
+def exit_code(found: Sequence[tuple[Bug, Verdict]]) -> int:
+    """1 if a release does not do what was reported, 3 if one could not be run, otherwise 0."""
+    kinds = {verdict.kind for _, verdict in found}
+    return 1 if "not shown" in kinds else 3 if "not run" in kinds else 0

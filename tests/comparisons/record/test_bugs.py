@@ -1,0 +1,109 @@
+"""The public reports: their list, the verdict from rows, and one case as a process."""
+
+import json
+from itertools import pairwise
+
+import pytest
+from support.cli import dropspin
+
+from dropspin.comparisons.engines.packages import numbers_of, version
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.record.bugs import FILE, Bug, Outcome, Verdict, load_bugs, measure, prepare, state_of, verdict
+from dropspin.comparisons.record.plan import load_plan
+from dropspin.scenarios import UnknownName, load
+
+BUG = Bug(name="a", reference="", year=2020, kind="", symptom="", label="wang", fault=(-0.97, -0.95), sound=1e-3, releases=("1.0", "1.1"))
+
+
+def outcomes(*states):
+    return [Outcome(release=f"1.{number}", state=state) for number, state in enumerate(states)]
+
+
+@pytest.mark.parametrize(
+    ("value", "state"),
+    [
+        (-0.96, "shown"),
+        (0.96, "another value"),
+        (-0.9, "another value"),
+        (5e-4, "not shown"),
+        (-5e-4, "not shown"),
+        (float("nan"), "another value"),
+    ],
+)
+def test_a_value_shows_the_fault_only_within_its_closed_form(value, state):
+    assert state_of(BUG, value) == state
+
+
+@pytest.mark.parametrize(
+    ("states", "expected"),
+    [
+        (["shown"], Verdict("shown")),
+        (["not shown", "shown"], Verdict("shown")),
+        (["shown", "shown", "not shown"], Verdict("fixed", "1.2")),
+        (["shown", "not shown", "not shown"], Verdict("fixed", "1.1")),
+        (["shown", "another value"], Verdict("not shown")),
+        (["not shown"], Verdict("not shown")),
+        (["another value"], Verdict("not shown")),
+        (["shown", "not run"], Verdict("not run")),
+        ([], Verdict("not run")),
+    ],
+)
+def test_the_verdict_is_made_of_what_the_releases_did(states, expected):
+    assert verdict(BUG, outcomes(*states)) == expected
+
+
+def test_a_report_that_no_scene_can_show_says_why():
+    bug = BUG.model_copy(update={"why_not": "no adapter"})
+    assert verdict(bug, []).kind == "not expressible"
+
+
+def test_the_list_has_links_scenes_metrics_and_releases_that_exist():
+    bugs, plan = load_bugs(), load_plan()
+    assert len({bug.reference for bug in bugs}) == len(bugs)
+    for bug in bugs:
+        assert bug.reference.startswith("https://"), bug.name
+        assert 2015 <= bug.year <= 2026, bug.name
+        assert bool(bug.label) != bool(bug.why_not), bug.name
+        if bug.label:
+            load(bug.arguments[1])
+            assert bug.metric in METRICS
+            assert bug.engine in plan.engines
+            assert all(numbers_of(one) < numbers_of(other) for one, other in pairwise(bug.releases)), bug.name
+            assert state_of(bug, sum(bug.fault) / 2) == "shown", bug.name
+            assert state_of(bug, 0.0) == "not shown", bug.name
+            assert bug.is_of_catalogue or bug.silent, bug.name
+    used = {bug.scene for bug in bugs if bug.label and not bug.is_of_catalogue}
+    assert {path.name for path in FILE.with_name("bugs").iterdir()} == used
+    with pytest.raises(UnknownName, match="pybullet-speed-limit"):
+        load_bugs(["pybullet-sped-limit"])
+
+
+def test_a_release_without_an_environment_costs_its_own_row(tmp_path):
+    bug = load_bugs(["pybullet-speed-limit"])[0].model_copy(update={"releases": ("0.0.1",)})
+    done = []
+    found = measure([bug], tmp_path, jobs=1, on_done=lambda *one: done.append(one))
+    assert [outcome.state for outcome in found[bug.name]] == ["not run"]
+    assert "dropspin bugs pybullet-speed-limit --prepare" in found[bug.name][0].said
+    assert len(done) == 1
+
+
+def test_an_environment_that_cannot_be_made_is_named_and_not_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr("dropspin.comparisons.record.environments.run", lambda command, stopping: (1, "ERROR: no such release"))
+    bug, told = load_bugs(["mujoco-rk4-second-order"])[0].model_copy(update={"releases": ("0.0.1",)}), []
+    prepare([bug], tmp_path, told.append)
+    assert told == ["mujoco 0.0.1: not installable: no such release"]
+    assert measure([bug], tmp_path, jobs=1, on_done=lambda *one: None)[bug.name][0].state == "not run"
+
+
+def test_a_bug_is_shown_by_the_installed_release(tmp_path):
+    """The release that is installed needs no environment."""
+    assert version("pybullet") in load_bugs(["pybullet-speed-limit"])[0].releases
+    done = dropspin("bugs", "pybullet-speed-limit", "brax-no-gyroscopic-term", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    first, second = json.loads(done.stdout)
+    assert first["value"] == pytest.approx(-0.96, abs=1e-9)
+    assert (first["verdict"], first["state"]) == ("shown", "shown")
+    assert first["said"].startswith("spin-principal-500 · pybullet")
+    assert second["verdict"].startswith("not expressible: ")
+    page = (tmp_path / "out/bugs/bugs.md").read_text(encoding="utf-8")
+    assert "issues/1890" in page

@@ -1,69 +1,29 @@
-"""Friction and restitution that an engine needs to continue the tosses of a recording, from the frames after the first contact.
-
-Each toss has a loss, by what remains of its frames beside the errors of its start:
-
-    loss = log(1 + q),    q = rᵀ (J Jᵀ + N + δ² 1)⁻¹ r / d
-
-r are the d differences of poses in these frames [m], rotations times the size of the body; J are their derivatives by the start, each times
-a standard deviation, by differences of that size, so that a toss that is sensitive to its start counts little; N is the white noise of the
-recording. δ is the discrepancy of the engine: the least for which 90 % of the tosses have q ≤ 2, so that tosses that no value fits, often
-those of several impacts, keep their weight beside those that one value fits well. The logarithm bounds the influence of a toss. The grid of
-the two parameters is refined around the estimates of all resamples.
-"""
+"""Friction and restitution that engines need to continue the tosses of a recording, from the frames after the first contact."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from itertools import combinations, pairwise
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+from scipy.special import stdtrit
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.logs.flights import Flights
-from dropspin.comparisons.logs.intervals import expanded, resamples
-from dropspin.comparisons.logs.log import Header, Log
-from dropspin.comparisons.logs.replay import (
-    Launches,
-    flights_in,
-    launches,
-    of_each_engine,
-    poses,
-    recorded,
-    scene_of,
-    time_step,
-    tracked,
-    usable,
-)
+from dropspin.comparisons.logs.grids import FIRST_GRID, Profile, problem_of, profile_of
+from dropspin.comparisons.logs.intervals import LEVEL, expanded
+from dropspin.comparisons.logs.log import Log
+from dropspin.comparisons.logs.replay import flights_in, of_each_engine
 from dropspin.comparisons.running.entries import engine_entries
-from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
-from dropspin.comparisons.running.recording import Breakdown
-from dropspin.scenarios import Scenario
-from dropspin.scenarios.rotations import rotation_vector
-from dropspin.scenarios.state import ORIENTATION, POSITION, Array
-from dropspin.scenarios.variations import with_values
+from dropspin.comparisons.running.processes import ResourceLimits
 
+ANY_ENGINE = "any engine"
 ENGINES = ("mujoco", "wang[contact=sequential,law=coulomb]")
 FRAMES = 8
 """Frames after the last one of the flight."""
-FIRST_GRID = {"friction": np.linspace(0.0, 1.0, 9) ** 1.5, "restitution": np.linspace(0.0, 1.0, 9)}
-GRID, FINER = 7, 8
-"""Values of a parameter in a refined grid, and of values between two of them at which the losses are interpolated."""
-MOST_GRIDS = 8
-MARGIN = 0.75
-"""Of a finer grid beside the estimates of the resamples, as a share of the distance of two values of the coarser one."""
-FINE_ENOUGH = 0.3
-"""Distance of two values of a grid over the width of the estimates of 99 % of the resamples."""
-SHARE, LIMIT = 0.9, 2.0
-"""The share of the tosses whose q is at most the limit, by the choice of δ; the engine that made the tosses leaves q near 1."""
-ROUNDS = 3
-"""Rounds in which the parameters and the discrepancy are found, each by the other."""
-DISCREPANCIES = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 121)])
-"""Discrepancies to choose from [m]."""
-TIE = 1e-3
-"""Of sums of losses: parameters with which a sum is larger by no more are as good."""
+EQUAL = 0.02
+"""Difference of a parameter between engines that may be neglected: in a restitution of 0.4, it changes a rebound's height by a tenth."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +50,18 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Disagreement:
-    """A parameter of which two engines need different values for the same tosses: first - second, with its 95 % interval."""
+class Transfer:
+    """The difference of a parameter between two engines for the same tosses, first - second, with its 95 % interval.
+
+    Attributes:
+        parameter: `friction` or `restitution`.
+        first: An engine's label.
+        second: Another one's.
+        difference: The difference of the estimates.
+        lower: Lower end of its interval.
+        upper: Upper end of its interval.
+        verdict: `equal` if the interval is within `EQUAL` of 0, `different` if it is on one side of 0, else `undecided`.
+    """
 
     parameter: str
     first: str
@@ -99,6 +69,7 @@ class Disagreement:
     difference: float
     lower: float
     upper: float
+    verdict: str
 
 
 @dataclass(frozen=True)
@@ -109,7 +80,9 @@ class LogFit:
         tosses: Number of tosses.
         frames: Number of frames of each after its flight.
         estimates: The parameters of each engine.
-        disagreements: The parameters on which two engines disagree.
+        transfers: The differences between two engines, of parameters that the tosses identify with both.
+        friction: The friction whichever engine is used, with an interval that contains the differences between engines as well; None with
+            fewer than two engines that identify it.
         discrepancies: By engine, what it leaves of these frames beside noise and errors of the start [m].
         left_out: By engine, why it has no estimate.
     """
@@ -117,39 +90,10 @@ class LogFit:
     tosses: int
     frames: int
     estimates: tuple[Estimate, ...]
-    disagreements: tuple[Disagreement, ...]
+    transfers: tuple[Transfer, ...]
+    friction: Estimate | None
     discrepancies: Mapping[str, float]
     left_out: Mapping[str, str]
-
-
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """What all engines are given: the tosses, and those from starts that differ by a standard deviation in each of 12 directions."""
-
-    scene: Scenario
-    dt: float
-    measured: Array
-    launched: Launches
-    perturbed: Launches
-    header: Header
-    variances: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Profile:
-    """The estimates of an engine in resamples of the tosses.
-
-    Attributes:
-        lower: The least values that are as good as the best, by resample and parameter, shape (RESAMPLES, 2).
-        upper: The largest ones.
-        value: The estimate from the tosses themselves, shape (2,).
-        discrepancy: δ [m].
-    """
-
-    lower: Array
-    upper: Array
-    value: Array
-    discrepancy: float
 
 
 def log_fit(
@@ -177,124 +121,49 @@ def log_fit(
     Raises:
         DropspinError: The recording has no floor, or too few tosses with frames after a flight.
     """
-    entries, problem = engine_entries(engines, ENGINES), _problem(flights_in(recording), frames)
-    profiles, left_out = of_each_engine(entries, partial(_profile, problem), on_progress, resources, jobs)
-    size = len(problem.measured)
-    estimates = [_estimate(label, one, column, size) for label, one in profiles.items() for column in range(len(FIRST_GRID))]
-    pairs = [
-        _disagreement(first, second, profiles[first], profiles[second], column, size)
-        for first, second in combinations(profiles, 2)
-        for column in range(len(FIRST_GRID))
-    ]
-    disagreements = tuple(pair for pair in pairs if pair.lower > 0.0 or pair.upper < 0.0)
-    discrepancies = {label: one.discrepancy for label, one in profiles.items()}
-    return LogFit(size, frames, tuple(estimates), disagreements, discrepancies, left_out)
+    entries, problem = engine_entries(engines, ENGINES), problem_of(flights_in(recording), frames)
+    profiles, left_out = of_each_engine(entries, partial(profile_of, problem), on_progress, resources, jobs)
+    size, friction = len(problem.measured), None
+    estimates: list[Estimate] = []
+    transfers: list[Transfer] = []
+    for parameter in FIRST_GRID:
+        of_each = {label: _estimate(label, parameter, profile, size) for label, profile in profiles.items()}
+        identified = {label: profiles[label] for label, one in of_each.items() if one.has_lower or one.has_upper}
+        estimates += of_each.values()
+        transfers += [_transfer(parameter, *pair, identified, size) for pair in combinations(identified, 2)]
+        if parameter == "friction" and len(identified) > 1:
+            friction = _of_all(parameter, identified, size)
+    discrepancies = {label: profile.discrepancy for label, profile in profiles.items()}
+    return LogFit(size, frames, tuple(estimates), tuple(transfers), friction, discrepancies, left_out)
 
 
-def _problem(flights: Flights, frames: int) -> _Problem:
-    """What all engines are given."""
-    header, starts = flights.log.header, usable(flights, frames)
-    scene, dt = scene_of(header), time_step(starts)
-    launched = launches(scene, starts, np.array([start.state for start in starts]), dt, frames)
-    steps = [np.linalg.eigh(start.covariance) for start in starts]
-    moved = np.concatenate(
-        [start.moved((vectors * np.sqrt(np.maximum(values, 0.0))).T) for start, (values, vectors) in zip(starts, steps, strict=True)]
-    )
-    perturbed = launches(scene, [start for start in starts for _ in range(12)], moved, dt, frames)
-    noise = np.repeat([flights.moving.noise.white, header.body.size * flights.turning.noise.white], 3)
-    return _Problem(scene, dt, recorded(starts, frames)[:, 1:], launched, perturbed, header, np.tile(noise**2, frames))
-
-
-def _profile(problem: _Problem, entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> _Profile | Breakdown:
-    """The estimates of an engine in resamples of the tosses, on grids that are refined around them."""
-    axes, counts = tuple(FIRST_GRID.values()), resamples(len(problem.measured))
-    for number in range(1, MOST_GRIDS + 1):
-        report(f"{entry.label}, grid {number}")
-        scenes = [with_values(problem.scene, "floor", friction=f, restitution=e) for f in axes[0].tolist() for e in axes[1].tolist()]
-        found = processes.call(entry, poses, scenes, problem.launched, problem.dt)
-        if isinstance(found, Breakdown):
-            return found
-        residuals = _differences(problem, problem.measured, found)
-        best = int(np.argmin(np.median(np.mean(residuals**2, axis=2), axis=1)))
-        around = processes.call(entry, poses, [scenes[best]], problem.perturbed, problem.dt)
-        if isinstance(around, Breakdown):
-            return around
-        nominal = tracked(problem.header, found[best])[:, 1:]
-        derivatives = _differences(problem, np.repeat(nominal, 12, axis=0), around)[0].reshape(*nominal.shape[:1], 12, -1)
-        losses, discrepancy = _losses(residuals, derivatives, problem.variances)
-        profile = _Profile(*_best(losses, axes, counts), discrepancy)
-        each = zip(axes, FIRST_GRID.values(), profile.lower.T, profile.upper.T, strict=True)
-        refined = [_refined(*of_axis) for of_axis in each]
-        if all(new is None for new in refined):
-            break
-        axes = tuple(axis if new is None else new for axis, new in zip(axes, refined, strict=True))
-    return profile
-
-
-def _differences(problem: _Problem, reference: Array, found: Array) -> Array:
-    """Poses minus those of a reference, shape (m, frames, 7), without the first frame, in metres, shape (scenes, m, 6 frames)."""
-    seen = tracked(problem.header, found)[:, :, 1:]
-    turned = problem.header.body.size * rotation_vector(reference[..., ORIENTATION], seen[..., ORIENTATION])
-    return np.concatenate([seen[..., POSITION] - reference[..., POSITION], turned], axis=-1).reshape(*seen.shape[:2], -1)
-
-
-def _losses(residuals: Array, derivatives: Array, variances: Array) -> tuple[Array, float]:
-    """The losses of tosses by scene, shape (scenes, m), and the discrepancy [m]."""
-    covariance = np.einsum("mki,mkj->mij", derivatives, derivatives) + np.diag(variances)
-    values, vectors = np.linalg.eigh(covariance)
-    squares = np.einsum("tmi,mij->tmj", residuals, vectors, optimize=True) ** 2
-    discrepancy = 0.0
-    for _ in range(ROUNDS):
-        q = np.mean(squares / (values + discrepancy**2), axis=2)
-        best = squares[np.argmin(np.log1p(q).sum(axis=1))]
-        tried = np.mean(best / (values + DISCREPANCIES[:, np.newaxis, np.newaxis] ** 2), axis=2)
-        fits = np.quantile(tried, SHARE, axis=1) <= LIMIT
-        discrepancy = float(DISCREPANCIES[np.argmax(fits)])
-    return np.log1p(np.mean(squares / (values + discrepancy**2), axis=2)), discrepancy
-
-
-def _best(losses: Array, axes: tuple[Array, ...], counts: Array) -> tuple[Array, Array, Array]:
-    """The least and the largest of the best parameters in resamples, shapes (RESAMPLES, 2), and those from the tosses themselves, (2,)."""
-    fine = [_interpolation(axis) for axis in axes]
-    table = losses.reshape(len(axes[0]), len(axes[1]), -1)
-    table = np.einsum("ai,bj,ijm->abm", fine[0][1], fine[1][1], table, optimize=True)
-    lower, upper = np.empty((2, len(counts) + 1, 2))
-    sums = np.tensordot(np.vstack([counts, np.ones(counts.shape[1])]), table, axes=(1, 2))
-    for column, (values, _) in enumerate(fine):
-        least = sums.min(axis=2 - column)
-        good = least <= least.min(axis=1, keepdims=True) + TIE
-        lower[:, column] = values[np.argmax(good, axis=1)]
-        upper[:, column] = values[len(values) - 1 - np.argmax(good[:, ::-1], axis=1)]
-    return lower[:-1], upper[:-1], 0.5 * (lower[-1] + upper[-1])
-
-
-def _interpolation(axis: Array) -> tuple[Array, Array]:
-    """Values between those of a grid, and the matrix that interpolates to them."""
-    between = np.concatenate([np.linspace(low, high, FINER, endpoint=False) for low, high in pairwise(axis)] + [axis[-1:]])
-    return between, make_interp_spline(axis, np.eye(len(axis)))(between)
-
-
-def _refined(axis: Array, tried: Array, lower: Array, upper: Array) -> Array | None:
-    """A grid around the estimates of almost all resamples, finer unless these are at its ends; None if the grid is fine enough.
-
-    `tried` is the first grid, beyond which no value is.
-    """
-    first, last, distance = float(np.quantile(lower, 0.005)), float(np.quantile(upper, 0.995)), float(np.diff(axis).max())
-    encloses = (axis[0] < first or axis[0] == tried[0]) and (last < axis[-1] or axis[-1] == tried[-1])
-    if encloses and distance <= FINE_ENOUGH * (last - first):
-        return None
-    return np.linspace(max(tried[0], first - MARGIN * distance), min(tried[-1], last + MARGIN * distance), GRID)
-
-
-def _estimate(label: str, profile: _Profile, column: int, size: int) -> Estimate:
+def _estimate(label: str, parameter: str, profile: Profile, size: int) -> Estimate:
     """A parameter of an engine, from the tosses and their resamples."""
+    tried, column = FIRST_GRID[parameter], list(FIRST_GRID).index(parameter)
     lower, upper = expanded(profile.lower[:, column], profile.upper[:, column], size)
-    name, tried = list(FIRST_GRID.items())[column]
-    return Estimate(label, name, float(profile.value[column]), lower, upper, bool(lower > tried[0]), bool(upper < tried[-1]))
+    return Estimate(label, parameter, float(profile.value[column]), lower, upper, bool(lower > tried[0]), bool(upper < tried[-1]))
 
 
-def _disagreement(first: str, second: str, one: _Profile, other: _Profile, column: int, size: int) -> Disagreement:
+def _transfer(parameter: str, first: str, second: str, profiles: Mapping[str, Profile], size: int) -> Transfer:
     """The difference of a parameter between two engines, resample by resample."""
+    column, one, other = list(FIRST_GRID).index(parameter), profiles[first], profiles[second]
     lower, upper = expanded(one.lower[:, column] - other.upper[:, column], one.upper[:, column] - other.lower[:, column], size)
-    difference = float(one.value[column] - other.value[column])
-    return Disagreement(list(FIRST_GRID)[column], first, second, difference, lower, upper)
+    differs, is_equal = lower > 0.0 or upper < 0.0, max(-lower, upper) <= EQUAL
+    verdict = "equal" if is_equal else "different" if differs else "undecided"
+    return Transfer(parameter, first, second, float(one.value[column] - other.value[column]), lower, upper, verdict)
+
+
+def _of_all(parameter: str, profiles: Mapping[str, Profile], size: int) -> Estimate:
+    """A parameter whichever engine continues the tosses, as the mean over engines that differ at random.
+
+    The variance of the mean is that of resamples of the tosses and that of the engines; Student's t has the degrees of freedom of both.
+    """
+    column = list(FIRST_GRID).index(parameter)
+    values = np.array([profile.value[column] for profile in profiles.values()])
+    resampled = np.mean([0.5 * (profile.lower + profile.upper)[:, column] for profile in profiles.values()], axis=0)
+    variances = np.array([resampled.var() * size / (size - 1), values.var(ddof=1) / len(values)])
+    freedom = variances.sum() ** 2 / np.sum(variances**2 / [size - 1, len(values) - 1])
+    half = float(stdtrit(freedom, 0.5 * (1.0 + LEVEL)) * np.sqrt(variances.sum()))
+    value, tried = float(values.mean()), FIRST_GRID[parameter]
+    lower, upper = max(value - half, float(tried[0])), min(value + half, float(tried[-1]))
+    return Estimate(ANY_ENGINE, parameter, value, lower, upper, bool(lower > tried[0]), bool(upper < tried[-1]))

@@ -1,10 +1,10 @@
-"""The output of `dropspin log fit`: friction and restitution by engine, and what engines disagree on."""
+"""The output of `dropspin log fit`: friction and restitution by engine, and which of them transfer from one engine to another."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, Literal
 
-from dropspin.comparisons.logs.fit import Disagreement, Estimate, LogFit
+from dropspin.comparisons.logs.fit import EQUAL, Estimate, LogFit, Transfer
 from dropspin.comparisons.logs.log import Finding
 from dropspin.reports.document import Charts, Document, Sentences, Table
 from dropspin.reports.plots.intervals import Interval, interval_rows
@@ -12,9 +12,17 @@ from dropspin.reports.stories.log_findings import corrections
 from dropspin.reports.stories.numbers import formatted, grouped, left_out
 from dropspin.reports.stories.study import Study, with_all_columns
 
-DISAGREEMENTS: Mapping[str, str] = {
-    "restitution": "it is a setting of the engine, not a property of the body",
-    "friction": "it depends on the engine's model of contact",
+TRANSFERS: Mapping[str, Mapping[str, str]] = {
+    "restitution": {
+        "equal": "Restitution transfers between {first} and {second}",
+        "undecided": "The tosses do not show that restitution transfers between {first} and {second}: use the value of each with it alone",
+        "different": "Restitution does not transfer between {first} and {second}: it is a setting of the engine, not of the body",
+    },
+    "friction": {
+        "equal": "Friction transfers between {first} and {second}",
+        "undecided": "The tosses do not show that friction transfers between {first} and {second}",
+        "different": "Friction does not transfer between {first} and {second}: it depends on the engine's model of contact",
+    },
 }
 NOT_IDENTIFIED: Mapping[str, str] = {
     "friction": "no toss slides, or the engine does not use it; tosses that strike the floor at a flat angle would bound it",
@@ -31,21 +39,24 @@ class FittedLog(Study):
     fit: LogFit
 
     def rows(self) -> list[dict[str, Any]]:
-        """Every estimate and every disagreement, and a row for each engine left out."""
-        fit = self.fit
-        rows = [{"row": "estimates", **asdict(one), "discrepancy": fit.discrepancies[one.engine]} for one in fit.estimates]
-        rows += [{"row": "disagreements", **asdict(one)} for one in fit.disagreements]
+        """Every estimate, every difference between two engines, and a row for each engine left out."""
+        fit, estimates = self.fit, [*self.fit.estimates, *([self.fit.friction] if self.fit.friction else [])]
+        rows = [{"row": "estimates", **asdict(one), "discrepancy": fit.discrepancies.get(one.engine)} for one in estimates]
+        rows += [{"row": "transfers", **asdict(one)} for one in fit.transfers]
         return with_all_columns(rows, fit.left_out)
 
     def document(self) -> Document:
-        """A row for each engine, and a sentence for each disagreement and each parameter that the tosses do not identify."""
+        """A row for each engine, and a sentence for each pair of engines and each parameter that the tosses do not identify."""
         fit, rows = self.fit, []
         for engine, estimates in grouped(fit.estimates, lambda estimate: estimate.engine).items():
             cells = {estimate.parameter: interval(estimate) for estimate in estimates}
             rows.append({"engine": engine, **cells, "discrepancy": f"{formatted(1e3 * fit.discrepancies[engine])} mm"})
+        if fit.friction:
+            rows.append({"engine": fit.friction.engine, "friction": interval(fit.friction), "restitution": "", "discrepancy": ""})
         legend = (
             f"From {fit.frames} frames after the flight of each of {fit.tosses} tosses, with 95 % intervals. The discrepancy is what an "
-            "engine leaves of these frames beside the noise of the recording and the errors of the start."
+            "engine leaves of these frames beside the noise of the recording and the errors of the start. The "
+            "interval of an engine is for this engine alone; that of any engine contains the differences between engines."
         )
         unknown = [
             f"{one.parameter.capitalize()} is not identified with {one.engine}: {NOT_IDENTIFIED[one.parameter]}."
@@ -56,7 +67,7 @@ class FittedLog(Study):
             interval_rows(parameter, [Interval(one.engine, one.value, one.lower, one.upper) for one in of_one])
             for parameter, of_one in grouped(fit.estimates, lambda estimate: estimate.parameter).items()
         ]
-        sentences = [legend, *unknown, *map(disagreement, fit.disagreements), *left_out(fit.left_out)]
+        sentences = [legend, *unknown, *map(transfer, fit.transfers), *left_out(fit.left_out)]
         return Document(
             f"Friction and restitution of {self.recording}",
             [Table(rows), *([Charts("coefficients", charts)] if charts else []), Sentences(sentences)],
@@ -74,10 +85,10 @@ def interval(estimate: Estimate) -> str:
     return "not identified"
 
 
-def disagreement(found: Disagreement) -> str:
-    """A sentence on a parameter of which two engines need different values."""
+def transfer(found: Transfer) -> str:
+    """Whether the value of a parameter with one engine is that with another."""
+    statement = TRANSFERS[found.parameter][found.verdict].format(first=found.first, second=found.second)
     return (
-        f"Two engines disagree on {found.parameter}: {DISAGREEMENTS[found.parameter]}. {found.first} needs "
-        f"{abs(found.difference):.3f} {'more' if found.difference > 0.0 else 'less'} than {found.second} "
-        f"(95 % interval of the difference {found.lower:.3f} to {found.upper:.3f})."
+        f"{statement}. {found.first} needs {abs(found.difference):.3f} {'more' if found.difference > 0.0 else 'less'} (95 % interval of "
+        f"the difference {found.lower:.3f} to {found.upper:.3f}; equal is up to {EQUAL})."
     )

@@ -1,6 +1,7 @@
-"""Recordings: changed headers, and damaged data in every format."""
+"""Recordings: changed headers, damaged data in every format, and the measured tosses of a scene."""
 
 import io
+import json
 
 import numpy as np
 import pyarrow as pa
@@ -8,6 +9,7 @@ import pyarrow.parquet as pq
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dropspin.scenarios.loading import CATALOGUE
 from fuzz.campaign import cases
 from fuzz.cases import run, surroundings
 from fuzz.inputs import toml
@@ -55,3 +57,23 @@ def test_data_are_checked_or_refused(damage):
         (work / name).write_bytes(content)
         (work / "toss.toml").write_bytes(toml(HEADER | {"data": name}))
         run(work, "log", "check", "toss.toml", "-o", "out", outputs=["out"])
+
+
+def tosses():
+    """The file of tosses of a scene, with one toss of three frames."""
+    recording = json.loads((CATALOGUE / "toss-cube.json").read_bytes())
+    first = {key: values if key in ("name", "starts") else values[:3] for key, values in recording["tosses"][0].items()}
+    return recording | {"tosses": [first]}
+
+
+SCENE = {"body": HEADER["body"], "floor": HEADER["floor"], "recording": {"file": "tosses.json"}}
+TOSSES = tosses()
+
+
+@cases(40)
+@given(edited(TOSSES).map(json.dumps).map(str.encode) | damaged(json.dumps(TOSSES).encode()))
+def test_measured_tosses_of_a_scene_are_read_or_refused(content):
+    with surroundings() as work:
+        (work / "tosses.json").write_bytes(content)
+        (work / "scene.toml").write_bytes(toml(SCENE))
+        run(work, "show", "scene.toml", outputs=[])

@@ -5,7 +5,9 @@ import pytest
 from support.log_fits import WANG, tosses
 
 from dropspin.comparisons.engines.wang import Wang
+from dropspin.comparisons.logs import fit as log_fits
 from dropspin.comparisons.logs.fit import log_fit
+from dropspin.comparisons.logs.grids import Profile
 from dropspin.scenarios.variations import with_values
 
 
@@ -28,6 +30,12 @@ class Breaking(Wang):
         raise RuntimeError("out of order")
 
 
+class Renamed(Wang):
+    """The same engine under another name."""
+
+    name = "renamed"
+
+
 OPTIONS = {"contact": "sequential", "law": "coulomb"}
 
 
@@ -48,14 +56,41 @@ def test_engine_finds_its_own_friction_and_restitution_from_ten_tosses():
     assert sum(hits) >= 5
 
 
-def test_engines_agree_on_friction_and_disagree_on_restitution():
+def test_restitution_transfers_to_the_engine_under_another_name_alone():
     """The impact of another engine needs another coefficient for the same rebounds; and an engine that breaks costs its own row."""
-    fit = log_fit(tosses(np.random.default_rng(5), 12, WANG, 0.25, 0.5), [WANG, "mujoco", Breaking(OPTIONS)], jobs=1)
-    assert [(one.parameter, one.first, one.second) for one in fit.disagreements] == [("restitution", WANG, "mujoco")]
-    other = estimates(fit, "mujoco")["friction"]
-    assert other.lower <= 0.25 <= other.upper
+    renamed, breaking = Renamed(OPTIONS), Breaking(OPTIONS)
+    fit = log_fit(tosses(np.random.default_rng(5), 12, WANG, 0.25, 0.5), [WANG, "mujoco", renamed, breaking], jobs=1)
+    verdicts = {(one.parameter, one.first, one.second): one.verdict for one in fit.transfers}
+    assert verdicts[("restitution", WANG, "mujoco")] == verdicts[("restitution", "mujoco", renamed.label)] == "different"
+    assert verdicts[("restitution", WANG, renamed.label)] == verdicts[("friction", WANG, renamed.label)] == "equal"
+    assert fit.friction.lower <= 0.25 <= fit.friction.upper
     assert fit.discrepancies["mujoco"] > 5.0 * fit.discrepancies[WANG]
-    assert "out of order" in fit.left_out[Breaking(OPTIONS).label]
+    assert "out of order" in fit.left_out[breaking.label]
+
+
+@pytest.mark.parametrize(
+    ("spread", "verdict"), [((0.0, 0.005), "equal"), ((-0.1, 0.005), "different"), ((-0.05, 0.2), "undecided"), ((0.0, 0.2), "undecided")]
+)
+def test_verdict_on_a_parameter_of_two_engines(spread, verdict):
+    """Resamples of the first engine differ from 0.5, all those of the second, by a mean and a standard deviation."""
+    of_first = 0.5 + spread[0] + spread[1] * np.random.default_rng(9).normal(size=(1999, 2))
+    profiles = {"first": profile(of_first, 0.5 + spread[0]), "second": profile(np.full((1999, 2), 0.5), 0.5)}
+    found = log_fits._transfer("restitution", "first", "second", profiles, 50)
+    assert (found.verdict, found.difference) == (verdict, pytest.approx(spread[0]))
+
+
+def test_friction_of_any_engine_has_the_interval_of_a_mean_over_engines():
+    """Two engines at 0.20 and 0.22 without sampling errors: 0.21 ± t(0.975; 1) 0.02 / 2; with sampling errors alone, t(0.975; 49)."""
+    exact = {"first": profile(np.full((1999, 2), 0.20), 0.20), "second": profile(np.full((1999, 2), 0.22), 0.22)}
+    found = log_fits._of_all("friction", exact, 50)
+    assert (found.value, found.lower, found.upper) == pytest.approx((0.21, 0.21 - 12.7062 * 0.01, 0.21 + 12.7062 * 0.01), abs=1e-5)
+    drawn = 0.3 + 0.01 * np.random.default_rng(10).normal(size=(1999, 2))
+    found = log_fits._of_all("friction", dict.fromkeys(("first", "second"), profile(drawn, 0.3)), 50)
+    assert found.upper - 0.3 == pytest.approx(2.0096 * np.sqrt(50 / 49) * drawn[:, 0].std(), rel=1e-4)
+
+
+def profile(resampled, value):
+    return Profile(resampled, resampled, np.full(2, value), 0.0)
 
 
 def test_engine_with_half_of_the_friction_needs_twice_as_much():

@@ -1,6 +1,6 @@
-"""What is said of friction and restitution: bounds where there are bounds, and whose property a disagreement is."""
+"""What is said of friction and restitution: bounds where there are bounds, and whether a value is one of the engine or of the body."""
 
-from dropspin.comparisons.logs.fit import Disagreement, Estimate, LogFit
+from dropspin.comparisons.logs.fit import Estimate, LogFit, Transfer
 from dropspin.comparisons.logs.log import Cause, Finding
 from dropspin.reports.document import Charts, Sentences, Table
 from dropspin.reports.stories.log_fit import FittedLog, interval
@@ -15,10 +15,13 @@ def test_interval_has_only_the_ends_that_the_tosses_give():
     assert texts == ["0.300 (0.200 to 0.400)", "at least 0.200", "at most 0.400", "not identified"]
 
 
-def test_disagreement_on_restitution_is_a_setting_and_unidentified_friction_is_explained():
-    disagreement = Disagreement("restitution", "mujoco", "wang", -0.158, -0.195, -0.133)
+def test_restitution_that_differs_is_a_setting_and_unidentified_friction_is_explained():
+    different = Transfer("restitution", "mujoco", "wang", -0.158, -0.195, -0.133, "different")
+    equal = Transfer("friction", "mujoco", "wang", 0.001, -0.006, 0.008, "equal")
+    undecided = Transfer("restitution", "mujoco", "bullet", 0.01, -0.02, 0.04, "undecided")
+    of_all = Estimate("any engine", "friction", 0.2, 0.18, 0.22, True, True)
     estimates = (estimate("friction", False, False), estimate("restitution", True, True))
-    fit = LogFit(100, 8, estimates, (disagreement,), {"mujoco": 0.00224}, {"broken": "out of order"})
+    fit = LogFit(100, 8, estimates, (different, equal, undecided), of_all, {"mujoco": 0.00224}, {"broken": "out of order"})
     scale = Finding("scale", 9.6, 9.81, causes=(Cause("length scale", -0.022, {"length_scale": 0.978}),))
     study = FittedLog(recording="r.toml", findings=[scale, Finding("drag", 0.06, 0.0)], fit=fit)
     document = FittedLog.model_validate_json(study.model_dump_json()).document()
@@ -27,12 +30,15 @@ def test_disagreement_on_restitution_is_a_setting_and_unidentified_friction_is_e
     assert [(chart.x_label, chart.rows) for chart in charts.charts] == [("friction", ("mujoco",)), ("restitution", ("mujoco",))]
     assert isinstance(table, Table)
     assert table.rows == [
-        {"engine": "mujoco", "friction": "not identified", "restitution": "0.300 (0.200 to 0.400)", "discrepancy": "2.24 mm"}
+        {"engine": "mujoco", "friction": "not identified", "restitution": "0.300 (0.200 to 0.400)", "discrepancy": "2.24 mm"},
+        {"engine": "any engine", "friction": "0.200 (0.180 to 0.220)", "restitution": "", "discrepancy": ""},
     ]
     assert isinstance(sentences, Sentences)
     text = " ".join(sentences.items)
-    assert "Two engines disagree on restitution: it is a setting of the engine, not a property of the body." in text
-    assert "mujoco needs 0.158 less than wang" in text
+    assert "Restitution does not transfer between mujoco and wang: it is a setting of the engine, not of the body." in text
+    assert "mujoco needs 0.158 less (95 % interval of the difference -0.195 to -0.133" in text
+    assert "Friction transfers between mujoco and wang." in text
+    assert "The tosses do not show that restitution transfers between mujoco and bullet: use the value of each with it alone." in text
     assert "Friction is not identified with mujoco: no toss slides" in text
     assert "broken, out of order" in text
     [correct] = document.summary

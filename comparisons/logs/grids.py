@@ -1,0 +1,183 @@
+"""Parameters with which an engine continues tosses, in resamples of these: the least losses on grids that are refined around them.
+
+Each toss has a loss, by what remains of its frames beside the errors of its start:
+
+    loss = log(1 + q),    q = rᵀ (J Jᵀ + N + δ² 1)⁻¹ r / d
+
+r are the d differences of poses in these frames [m], rotations times the size of the body; J are their derivatives by the start, each times
+a standard deviation, by differences of that size, so that a toss that is sensitive to its start counts little; N is the white noise of the
+recording. δ is the discrepancy of the engine: the least for which 90 % of the tosses have q ≤ 2, so that tosses that no value fits, often
+those of several impacts, keep their weight beside those that one value fits well. The logarithm bounds the influence of a toss.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from dropspin.comparisons.logs.flights import Flights
+from dropspin.comparisons.logs.intervals import resamples
+from dropspin.comparisons.logs.log import Header
+from dropspin.comparisons.logs.replay import Launches, launches, poses, recorded, scene_of, time_step, tracked, usable
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.processes import EngineProcesses
+from dropspin.comparisons.running.recording import Breakdown
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.rotations import rotation_vector
+from dropspin.scenarios.state import ORIENTATION, POSITION, Array
+from dropspin.scenarios.variations import with_values
+
+FIRST_GRID = {"friction": np.linspace(0.0, 1.0, 7) ** 1.5, "restitution": np.linspace(0.0, 1.0, 7)}
+GRID, FINER = 7, 8
+"""Values of a parameter in a refined grid, and of values between two of them to which residuals are interpolated."""
+MOST_GRIDS = 8
+MARGIN = 0.25
+"""Of a finer grid beside the estimates of the resamples, as a share of the distance of two values of the coarser one."""
+CORE = 0.05
+"""Share of the resamples on either side of the dense part of a grid."""
+FINE_ENOUGH, FINEST = 0.8, 1e-3
+"""Distance of two values of the dense part over its width, and the distance below which no finer grid is needed."""
+SHARE, LIMIT = 0.9, 2.0
+"""The share of the tosses whose q is at most the limit, by the choice of δ; the engine that made the tosses leaves q near 1."""
+ROUNDS = 3
+"""Rounds in which the parameters and the discrepancy are found, each by the other."""
+DISCREPANCIES = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 121)])
+"""Discrepancies to choose from [m]."""
+TIE = 1e-3
+"""Of sums of losses: parameters with which a sum is larger by no more are as good."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What all engines are given: the tosses, and those from starts that differ by a standard deviation in each of 12 directions."""
+
+    scene: Scenario
+    dt: float
+    measured: Array
+    launched: Launches
+    perturbed: Launches
+    header: Header
+    variances: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """The estimates of an engine in resamples of the tosses.
+
+    Attributes:
+        lower: The least values that are as good as the best, by resample and parameter, shape (RESAMPLES, 2).
+        upper: The largest ones.
+        value: The estimate from the tosses themselves, shape (2,).
+        discrepancy: δ [m].
+    """
+
+    lower: Array
+    upper: Array
+    value: Array
+    discrepancy: float
+
+
+def problem_of(flights: Flights, frames: int) -> Problem:
+    """What all engines are given."""
+    header, starts = flights.log.header, usable(flights, frames)
+    scene, dt = scene_of(header), time_step(starts)
+    launched = launches(scene, starts, np.array([start.state for start in starts]), dt, frames)
+    steps = [np.linalg.eigh(start.covariance) for start in starts]
+    moved = np.concatenate(
+        [start.moved((vectors * np.sqrt(np.maximum(values, 0.0))).T) for start, (values, vectors) in zip(starts, steps, strict=True)]
+    )
+    perturbed = launches(scene, [start for start in starts for _ in range(12)], moved, dt, frames)
+    noise = np.repeat([flights.moving.noise.white, header.body.size * flights.turning.noise.white], 3)
+    return Problem(scene, dt, recorded(starts, frames)[:, 1:], launched, perturbed, header, np.tile(noise**2, frames))
+
+
+def profile_of(problem: Problem, entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> Profile | Breakdown:
+    """The estimates of an engine in resamples of the tosses, on grids that are refined around them."""
+    axes, counts = tuple(FIRST_GRID.values()), resamples(len(problem.measured))
+    for number in range(1, MOST_GRIDS + 1):
+        report(f"{entry.label}, grid {number}")
+        scenes = [with_values(problem.scene, "floor", friction=f, restitution=e) for f in axes[0].tolist() for e in axes[1].tolist()]
+        found = processes.call(entry, poses, scenes, problem.launched, problem.dt)
+        if isinstance(found, Breakdown):
+            return found
+        residuals = _differences(problem, problem.measured, found)
+        best = int(np.argmin(np.median(np.mean(residuals**2, axis=2), axis=1)))
+        around = processes.call(entry, poses, [scenes[best]], problem.perturbed, problem.dt)
+        if isinstance(around, Breakdown):
+            return around
+        nominal = tracked(problem.header, found[best])[:, 1:]
+        derivatives = _differences(problem, np.repeat(nominal, 12, axis=0), around)[0].reshape(*nominal.shape[:1], 12, -1)
+        losses, discrepancy = _losses(residuals, derivatives, problem.variances, axes)
+        profile = Profile(*_best(losses, axes, counts), discrepancy)
+        each = zip(axes, FIRST_GRID.values(), profile.lower.T, profile.upper.T, strict=True)
+        refined = [_refined(*of_axis) for of_axis in each]
+        if all(new is None for new in refined):
+            break
+        axes = tuple(axis if new is None else new for axis, new in zip(axes, refined, strict=True))
+    return profile
+
+
+def _differences(problem: Problem, reference: Array, found: Array) -> Array:
+    """Poses minus those of a reference, shape (m, frames, 7), without the first frame, in metres, shape (scenes, m, 6 frames)."""
+    seen = tracked(problem.header, found)[:, :, 1:]
+    turned = problem.header.body.size * rotation_vector(reference[..., ORIENTATION], seen[..., ORIENTATION])
+    return np.concatenate([seen[..., POSITION] - reference[..., POSITION], turned], axis=-1).reshape(*seen.shape[:2], -1)
+
+
+def _losses(residuals: Array, derivatives: Array, variances: Array, axes: tuple[Array, ...]) -> tuple[Array, float]:
+    """The losses of tosses by the values of the two parameters between those of a grid, shape (a, b, m), and the discrepancy [m].
+
+    Residuals depend on the parameters nearly linearly, so that they are interpolated, and not the losses.
+    """
+    values, vectors = np.linalg.eigh(np.einsum("mki,mkj->mij", derivatives, derivatives) + np.diag(variances))
+    first, second = (_interpolation(axis)[1] for axis in axes)
+    turned = np.einsum("tmi,mij->mtj", residuals, vectors, optimize=True).reshape(len(values), len(axes[0]), len(axes[1]), -1)
+    discrepancy, squares = 0.0, [np.einsum("ai,bj,ijn->abn", first, second, toss, optimize=True) ** 2 for toss in turned]
+    for _ in range(ROUNDS):
+        losses = _losses_with(discrepancy, squares, values)
+        best = np.unravel_index(np.argmin(losses.sum(axis=2)), losses.shape[:2])
+        at_best = np.array([toss[best] for toss in squares])
+        tried = np.mean(at_best / (values + DISCREPANCIES[:, np.newaxis, np.newaxis] ** 2), axis=2)
+        discrepancy = float(DISCREPANCIES[np.argmax(np.quantile(tried, SHARE, axis=1) <= LIMIT)])
+    return _losses_with(discrepancy, squares, values), discrepancy
+
+
+def _losses_with(discrepancy: float, squares: list[Array], values: Array) -> Array:
+    """The losses, shape (a, b, m), from the squares of each toss, shape (a, b, d), and the variances of these, shape (m, d)."""
+    each = zip(squares, values + discrepancy**2, strict=True)
+    return np.log1p(np.stack([toss @ (1.0 / variances) for toss, variances in each], axis=-1) / values.shape[1])
+
+
+def _best(losses: Array, axes: tuple[Array, ...], counts: Array) -> tuple[Array, Array, Array]:
+    """The least and the largest of the best parameters in resamples, shapes (RESAMPLES, 2), and those from the tosses themselves, (2,)."""
+    lower, upper = np.empty((2, len(counts) + 1, 2))
+    sums = np.tensordot(np.vstack([counts, np.ones(counts.shape[1])]), losses, axes=(1, 2))
+    for column, axis in enumerate(axes):
+        values, least = _interpolation(axis)[0], sums.min(axis=2 - column)
+        good = least <= least.min(axis=1, keepdims=True) + TIE
+        lower[:, column] = values[np.argmax(good, axis=1)]
+        upper[:, column] = values[len(values) - 1 - np.argmax(good[:, ::-1], axis=1)]
+    return lower[:-1], upper[:-1], 0.5 * (lower[-1] + upper[-1])
+
+
+def _interpolation(axis: Array) -> tuple[Array, Array]:
+    """Values between those of a grid, and the matrix that interpolates to them."""
+    between = np.concatenate([np.linspace(low, high, FINER, endpoint=False) for low, high in pairwise(axis)] + [axis[-1:]])
+    return between, make_interp_spline(axis, np.eye(len(axis)))(between)
+
+
+def _refined(axis: Array, tried: Array, lower: Array, upper: Array) -> Array | None:
+    """A grid around the estimates of almost all resamples, dense around those of most; None if the grid is fine enough.
+
+    `tried` is the first grid, beyond which no value is.
+    """
+    low, core_low = (float(value) for value in np.quantile(lower, [0.005, CORE]))
+    core_high, high = (float(value) for value in np.quantile(upper, [1.0 - CORE, 0.995]))
+    step = float(np.diff(axis)[max(0, np.searchsorted(axis, core_low) - 1) : np.searchsorted(axis, core_high) + 1].max())
+    encloses = (axis[0] < low or axis[0] == tried[0]) and (high < axis[-1] or axis[-1] == tried[-1])
+    if encloses and step <= max(FINE_ENOUGH * (core_high - core_low), FINEST):
+        return None
+    core = np.linspace(core_low - MARGIN * step, core_high + MARGIN * step, GRID - 2)
+    return np.unique(np.clip([low - MARGIN * step, *core, high + MARGIN * step], tried[0], tried[-1]))

@@ -32,10 +32,14 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 
 def write_catalogue(_: Any) -> None:
-    """Write the page with the lists of `dropspin list`."""
+    """Write the page with the lists of `dropspin list`, and of `dropspin show` for installed engines whose settings can be given."""
+    from dropspin.comparisons.engines.registry import engine
     from dropspin.reports.stories import listings
+    from dropspin.reports.stories.show import setting_rows
 
     listed = {"Scenes": listings.scene_rows(), "Engines": listings.engine_rows(), "Metrics": listings.metric_rows()}
+    names = [row["engine"] for row in listed["Engines"] if row["installed"] == "yes" and engine(row["engine"]).settings]
+    listed |= {f"Settings of {name}": setting_rows(name) for name in names}
     parts = ["# Scenes, engines, metrics", *(f"## {title}\n\n{table(rows)}" for title, rows in listed.items())]
     CATALOGUE.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
 

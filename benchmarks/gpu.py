@@ -121,7 +121,7 @@ def table(rows: list[dict[str, str]], worlds: tuple[int, ...]) -> str:
     """The rows as Markdown, under the name of the card."""
     columns = ["engine", "checks", "GPU and processor", *(f"{count:,} worlds" for count in worlds)]
     lines = [" | ".join(row.get(column, "–") for column in columns) for row in rows]
-    head = [" | ".join(columns), "|".join("---" for _ in columns)]
+    head = [" | ".join(columns), " | ".join("---" for _ in columns)]
     return f"{card()}; steps per second of all worlds together in {THROUGHPUT}.\n\n" + "\n".join(f"| {line} |" for line in [*head, *lines])
 
 

@@ -96,7 +96,7 @@ class Contact(NamedTuple):
 
 
 def check_impacts(engine: Engine) -> str:
-    """No mistake explains the first impact of bodies that are thrown at a floor; whether the impact is right is for the probes to say."""
+    """No mistake explains the first impact of bodies that are thrown at a floor; the probes test whether the impact is right."""
     accepted, refusal = 0, None
     for name, content in read_toml(FILE, FILE.name).items():
         scene = with_height(from_mapping({"name": name.replace(" ", "-"), **content}), NEAR)
@@ -112,7 +112,7 @@ def check_impacts(engine: Engine) -> str:
 
 
 def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:
-    """The mistake, or the rule of its own, that gives the velocities after the first step of contact; None if there is none."""
+    """The known mistake or rule that gives the velocities after the first step of contact; None if no known one does."""
     case = Comparison(scene, motion)
     if scene.floor is None or not case.states.touching.any():
         return None
@@ -200,7 +200,7 @@ def check_later_impacts(engine: Engine) -> str:
 
 
 def decaying_restitution(engine: Engine) -> str | None:
-    """That restitution falls from impact to impact, by the same in falls at other speeds, one of them that of the second impact."""
+    """A message if restitution falls from impact to impact, whatever the speed of the fall; None if it does not."""
     found = restitutions(engine)
     if len(found) < FEWEST or any(later[0] > (1.0 - FALL) * one[0] for one, later in pairwise(found)):
         return None

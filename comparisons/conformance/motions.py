@@ -2,8 +2,8 @@
 
 A fault model changes the scene that is simulated, the states that are reported, or both. It explains an engine's motion if that motion is
 the exact solution of the changed scene, reported in the changed way. Faults that give the same motion of a probe cannot be distinguished by
-it, so that other probes are compared too. Two faults at once are recognised as well. Symptoms of a motion that no known fault explains are
-what differs from the exact solution, and by how much; what is right is left out.
+it, so that other probes are compared too. Two faults at once are recognised as well. If no known fault explains a motion, its
+symptoms are stated: which quantities differ from the exact solution, and by how much.
 """
 
 import math
@@ -229,8 +229,8 @@ def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
     moment = METRICS["contact_momentum_error"]
     if moment.applies(scene, exact_solution(scene)) and (turned := moment.value_or_nan([case])) > ELSEWHERE:
         yield (
-            "the velocities change in the first contact otherwise than by an impulse at the contact point: the angular momentum about it "
-            f"changes by {turned:.2g} of mass × distance from the centre × speed"
+            "an impulse at the contact point does not explain the change of the velocities in the first contact: the angular momentum "
+            f"about it changes by {turned:.2g} of mass × distance from the centre × speed"
         )
     if float(np.linalg.norm((found - exact)[[0, 2]])) > allowed:
         yield from _of_friction(found, exact)

@@ -190,7 +190,7 @@ def check_repeats(engine: Engine) -> str:
             raise CheckFailed("two simulations that take turns affect each other: simulations share state")
     if not _same(first, recorded(engine, a)):
         raise CheckFailed("the same scene gives different bits after another scene (A, B, A): a simulation leaves state behind")
-    return "a scene gives the same bits again and after another scene, and so do two that take turns"
+    return "a scene gives the same bits when it runs again, after another scene, and in turn with a second simulation"
 
 
 def _same(one: Array, other: Array) -> bool:

@@ -147,7 +147,7 @@ def _verify_single(engine: Engine, member: Scenario, dt: float, rows: Array, lag
     if lag != alone.velocity_lag:
         raise CheckFailed(f"velocity_lag is {lag!r}; that of a single simulation is {alone.velocity_lag!r}")
     entry = EngineEntry(engine.label, engine)
-    # A compiler vectorises a batch otherwise than a single simulation, and rounding depends on that.
+    # A compiler vectorises a batch differently from a single simulation, and rounding depends on that.
     effects = partial(effects_of_rounding, entry, member, dt, alone.states) if engine.compiles else None
     none = Finding(member.name, engine.label, "", "not run")
     found = judged(none, member, dt, [(alone.states, rows)], effects, engine.precision)

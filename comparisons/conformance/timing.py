@@ -134,9 +134,7 @@ def check_velocity_lag(engine: Engine) -> str:
             f"{explicit}velocity_lag is {stated:.3g} steps, but velocity lags position by {measured:.3g} steps, from the "
             f"displacement of a falling body; {_suggested_lag(measured)}"
         )
-    if (
-        min(abs(ahead), abs(ahead - measured)) > LAG_TOLERANCE
-    ):  # a lagging velocity is ahead by its lag, or not at all, as in a leapfrog scheme
+    if min(abs(ahead), abs(ahead - measured)) > LAG_TOLERANCE:  # a leapfrog scheme is not ahead, others by their lag
         raise CheckFailed(f"a fall runs ahead of the exact one by {ahead:.3g} steps; {NO_SCHEME}")
     if explicit:
         raise Noted(EXPLICIT_EULER)

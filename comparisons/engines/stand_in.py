@@ -1,4 +1,4 @@
-"""Stand-ins: what is known of an engine of one's own outside its process, where none of its code is imported.
+"""Stand-ins: what is known of a custom engine outside its process, where its code is not imported.
 
 The adapter's module is imported, and the engine constructed, in the engine's own process only. There `traits` describes it; elsewhere a
 stand-in has its name, its options and their values, and can be configured, but not run.
@@ -52,7 +52,7 @@ class Traits(BaseModel):
 
 
 class StandIn(Engine):
-    """An engine of one's own, outside its process."""
+    """A custom engine, outside its process."""
 
     traits: ClassVar[Traits]
 

@@ -55,7 +55,7 @@ def judge(
     verdict, basis, lower, upper = expected.verdict, expected.basis, expected.lower, expected.upper
     reason = joined(str(unresolved or ""), expected.reason)
     if math.isnan(value) and not unresolved:
-        verdict, reason = "failed", reason or "what it measures did not happen"
+        verdict, reason = "failed", reason or "the event that it measures did not occur"
     if isinstance(unresolved, BeyondHorizon) and verdict == "measured":
         verdict = "no_truth"
     if not unresolved:

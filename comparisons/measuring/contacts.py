@@ -42,7 +42,7 @@ RESIDUALS = ("pull", "cone_excess", "push", "gap")
 
 @dataclass(frozen=True, eq=False)
 class ContactResiduals:
-    """The violations of the laws of contact in each time step in which the velocity changes otherwise than by gravity; 0 where a law holds.
+    """The violations of the laws of contact in each time step in which something beside gravity changes the velocity; 0 if a law holds.
 
     Attributes:
         motion: The number of the motion of each of these time steps, shape (n,).

@@ -26,7 +26,7 @@ class StatesOfMany(NamedTuple):
         energy: Kinetic plus potential energy, velocity synchronised with position [J], shape (B, n).
         lowest_height: Height of the body's lowest point above the floor [m], shape (B, n). It may be inf where no point is below the floor,
             except at the rows of a step in `touching` and of the step before it.
-        touching: For each step, whether the velocity changes otherwise than by gravity and damping (`is_touching`), shape (B, n - 1).
+        touching: For each step, whether gravity and damping do not explain the change of the velocity (`is_touching`), shape (B, n - 1).
     """
 
     height: Array
@@ -96,7 +96,7 @@ class States:
 
     @cached_property
     def touching(self) -> Mask:
-        """For each step, whether the velocity changes otherwise than by gravity and damping (`is_touching`), shape (n - 1,)."""
+        """For each step, whether gravity and damping do not explain the change of the velocity (`is_touching`), shape (n - 1,)."""
         dt, gravity, damping = float(self.motion.t[1] - self.motion.t[0]), tuple(self.scene.acceleration), self.scene.damping
         before, after = (tuple(self.motion.velocity[rows].T) for rows in (slice(None, -1), slice(1, None)))
         strength = float(np.sqrt(scalar_product(gravity, gravity)))
@@ -106,7 +106,7 @@ class States:
 
 
 def is_touching(before: Components, after: Components, dt: float, gravity: Components, strength: float, damping_share: float) -> Any:
-    """Whether the velocity changes otherwise than by gravity and damping in a step, from the velocities before and after it.
+    """Whether gravity and damping do not explain the change of the velocity in a step, from the velocities before and after it.
 
     Without contact, only gravity and damping change the velocity. A remaining change counts if it exceeds 1e-3 of the change by gravity,
     1e-6 of the speed (for engines in single precision) and twice the change by damping (because engines use different laws of damping). The

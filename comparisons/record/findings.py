@@ -119,7 +119,7 @@ def in_order(record: Record, engine: str, names: Iterable[str]) -> list[Release]
 
 
 class Other(NamedTuple):
-    """A release that somebody else measured, which nothing proves.
+    """A release that somebody else measured; the record cannot verify its results.
 
     Attributes:
         name: The release.

@@ -22,7 +22,7 @@ OWN_CODE = "dropspin's own code"
 OF_DROPSPIN = frozenset({"dropspin", "code"})
 """The differences of the surroundings that are dropspin's."""
 MACHINE = {"python": "Python", "cpu": "processor", "platform": "platform"}
-NO_DIFFERENCE = "nothing that is recorded differs; the engine is not deterministic, or has changed without a new version"
+NO_DIFFERENCE = "no recorded property differs; the engine is not deterministic, or has changed without a new version"
 OWN_ENGINE = "wang"
 """The engine that is a part of dropspin."""
 CORRECTION = "a correction of dropspin, not a change of the engine"
@@ -119,7 +119,7 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str], mot
         corrected = ", ".join(text for part, text in around.items() if part in OF_DROPSPIN)
         return Attribution("dropspin", f"{CORRECTION}, whose motions are the same bit for bit: {corrected}", is_correction=True)
     if not own and not around:
-        return Attribution("nothing", "nothing that is recorded differs, nor do the motions" if motions == "same" else NO_DIFFERENCE)
+        return Attribution("nothing", "no recorded property and no motion differs" if motions == "same" else NO_DIFFERENCE)
     if around and around.keys() <= OF_DROPSPIN and own.keys() <= ({"adapter"} if name in BUILT_IN else set()):
         if motions == "different" and name == OWN_ENGINE:
             return Attribution("dropspin", f"a change of dropspin, of which {name} is a part: {listed}")

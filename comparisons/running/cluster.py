@@ -44,7 +44,7 @@ def connected(scheduler: str) -> Iterator[Any]:
         LoopRunner(asynchronous=False).run_sync(greet, callback_timeout=2.0 * CONNECT_TIMEOUT)  # type: ignore[no-untyped-call]
     except Exception as error:  # whatever distributed makes of the answer of another program
         is_connected = isinstance(error, TimeoutError) or not isinstance(error, OSError | ValueError)
-        reason = "what listens there does not answer as a scheduler" if is_connected else f"no scheduler answers ({error})"
+        reason = "the program at this address does not answer as a scheduler" if is_connected else f"no scheduler answers ({error})"
         raise DropspinError(f"--scheduler {scheduler}: {reason}; start one with: dask scheduler.") from None
     client = Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)  # type: ignore[no-untyped-call]
     with client, client.as_current():

@@ -1,4 +1,4 @@
-"""From the names of engines to entries of a run: an engine of one's own is imported and constructed in a process of its own only."""
+"""From the names of engines to entries of a run: a custom engine is imported and constructed only in its own process."""
 
 import sys
 from collections.abc import Iterable, Sequence
@@ -21,7 +21,7 @@ def engine_entry(engine: Engine | str, resources: ResourceLimits = CONSTRUCTION)
 
     Args:
         engine: The engine or its name.
-        resources: What the import and the construction of an engine of one's own may use.
+        resources: What the import and the construction of a custom engine may use.
 
     Raises:
         DropspinError: There is no engine of that name, or it is neither an engine nor a name.
@@ -58,7 +58,7 @@ def present_entry(engine: Engine | str) -> EngineEntry:
 
 
 def _stand_in(name: str, resources: ResourceLimits) -> Engine:
-    """The stand-in of an engine of one's own, described in a process of its own."""
+    """The stand-in of a custom engine, described in a process of its own."""
     with EngineProcesses(resources) as processes:
         found = processes.call(EngineEntry(name, None), _describe, name)
     if isinstance(found, Breakdown):

@@ -1,6 +1,6 @@
-"""A process for each engine, so that a crash, a hang or a leak costs the engine's own row and nothing else.
+"""A process for each engine, so that a crash, a hang or a leak affects only the rows of that engine.
 
-An engine of one's own is imported and constructed in its process, with the working directory on Python's path, and nowhere else.
+A custom engine is imported and constructed only in its process, with the working directory on Python's path.
 A segmentation fault ends the engine's process, not the run; an endless loop ends at a limit of processor time, which other load on the
 machine does not use up; a leak ends at a limit of memory; output of an engine is dropped. A process that ended is replaced for the next
 piece of work; each leads a process group, with which the engine's own children end.

@@ -1,4 +1,4 @@
-"""Progress of a run: what its callers are told while engines work."""
+"""Progress of a run, as its callbacks receive it while engines work."""
 
 from collections.abc import Callable
 from typing import NamedTuple

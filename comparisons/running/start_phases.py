@@ -1,4 +1,4 @@
-"""Start phases, and every metric of the motions from them: the same drop from 32 starts averages out where in a time step it lands.
+"""Start phases, and every metric of the motions from them: means over 32 starts average out the phase of an impact within a time step.
 
 An engine detects an impact at the first step that ends below the floor, so its error depends on the phase of the impact within a step.
 Starts that lie equal parts of a step further along the scene's motion draw that phase evenly (stratified sampling). A toss of a
@@ -68,7 +68,7 @@ def number_of_phases(own: StartPhase, dt: float) -> int:
 
 
 def start_phases(scene: Scenario, truth: Truth | None, dt: float, *, quick: bool = False) -> list[StartPhase]:
-    """The scene from starts that put its first impact at as many phases of a time step, or only the scene itself: `number_of_phases`."""
+    """The scene from `number_of_phases` starts, whose first impacts are at different phases of a time step, or only the scene itself."""
     count = number_of_phases(StartPhase(scene, truth, quick), dt)
     if truth is not None and not truth.is_exact:
         earlier = -(np.arange(PHASES_OF_TOSS) + 0.5) / PHASES_OF_TOSS * dt

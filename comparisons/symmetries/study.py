@@ -145,7 +145,7 @@ def _pairs(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str
     if name == HALVES:
         return _halves(entry, scene, dt, own)
     if name == BATCH:
-        # A compiler vectorises a batch otherwise than a single simulation, and rounding depends on that.
+        # A compiler vectorises a batch differently from a single simulation, and rounding depends on that.
         others = [batch_member(entry.adapter, scene, share) for share in FASTER]
         together = [finite(recording).states for recording in record_batch(entry.adapter, [scene, *others], dt)]
         alone = [own, *(states_of(entry, other, dt) for other in others)]

@@ -97,7 +97,7 @@ def scene_of(cells: int, **without: None) -> ds.Scenario:
 
 
 def impacts(scene: ds.Scenario, states: Array, dt: float) -> Array:
-    """For each step, whether the floor or the wall acts: the velocity changes otherwise than by gravity and damping."""
+    """For each step, whether the floor or the wall acts: gravity and damping do not explain the change of the velocity."""
     factor = scene.damping.factors["linear_factor"] if scene.damping else 1.0
     change = states[1:, 7:10] - factor * (states[:-1, 7:10] + dt * np.array([0.0, -GRAVITY, 0.0]))
     return np.linalg.norm(change, axis=1) > 1e-9

@@ -16,8 +16,8 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
 
     RECORDING is a header, a TOML file that names the body, the units and the file of data; or toss-cube, 100 measured tosses of a cube.
     Gravity, scale, drag, inertia and centre of mass are found from the flights alone, each with a 95 % interval, and wrong units, axes,
-    orders and rates are named with the remedy; corrected.toml in the output folder is the header with the remedies of which the recording
-    leaves no doubt. If the header has a floor, scenes/ beside it has a scene of each toss and one of all, from the end of the flights on:
+    orders and rates are named with the remedy; corrected.toml in the output folder is the header with every remedy that has no
+    alternative. If the header has a floor, scenes/ beside it has a scene of each toss and one of all, from the end of the flights on:
     dropspin run compares engines with the tosses.
 
     Exit code: 0 no finding, 1 a finding, 2 bad input.

@@ -13,7 +13,7 @@ from dropspin.reports.terminal.safe import echo
 @click.argument("record", default="record")
 @output_option("out/site-record", "of the site")
 def record_publish_command(record: str, output: str) -> None:
-    """Write a record as a site: which release of which engine changed what.
+    """Write a record as a site: the results of each release of each engine, and what changed.
 
     RECORD is the folder that dropspin record wrote. The site needs no server and no network. In a folder of the documentation's site, it
     links to the documentation.

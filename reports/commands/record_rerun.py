@@ -21,8 +21,8 @@ def record_rerun_command(engine: str, release: str, scene: str, folder: str, res
     """Measure a cell of the record again, and compare it bit for bit.
 
     ENGINE is an engine with options, RELEASE a release of it and SCENE a scene, as in the record. pip installs the release into a
-    temporary environment. The exit code is 1 if a motion differs from that of the record; then it is said which versions or which
-    processor differ.
+    temporary environment. The exit code is 1 if a motion differs from that of the record; the output then names the versions
+    and the processor, if they differ.
     """
     from dropspin.comparisons.engines.options import engine_name
     from dropspin.comparisons.record.plan import load_plan

@@ -23,7 +23,7 @@ def symmetries_command(scenes: tuple[str, ...], dt: float, output: str, json_out
     process, on one core, and stopped and continued. If the engine has other representations of body or floor, or can simulate a second
     body far away, these are compared too. No exact solution is needed. The default is seven scenes with wang, mujoco and pybullet.
 
-    Exit code: 0 whatever is found, 2 bad input; `dropspin run --symmetries` judges.
+    Exit code: 0 for any finding, 2 bad input; `dropspin run --symmetries` fails if a symmetry is lost.
     """
     from dropspin.comparisons.results.folder import study_folder
     from dropspin.comparisons.symmetries.study import SCENES, symmetries

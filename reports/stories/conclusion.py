@@ -9,6 +9,7 @@ from dropspin.comparisons.results.conclusion import ENOUGH, WITHIN, Answer, conc
 from dropspin.comparisons.results.results import Results, is_undecided
 from dropspin.reports.stories.matrix import step_times
 from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, named, quantity
+from dropspin.scenarios.text import counted
 
 MOST_QUESTIONS = 3
 
@@ -34,10 +35,12 @@ def _recommendation(answers: Sequence[Answer], within: float) -> str:
     """Which engines to use for a question that enough scenes test, the best first, and which not."""
     ordered = sorted(answers, key=lambda answer: (-len(answer.within), math.isnan(answer.cost), answer.cost))
     used = [f"{answer.engine} {_steps(answer)}{_exceptions(answer)}{_declined(answer)}" for answer in ordered if answer.is_recommended]
-    others = [f"{answer.engine} ({len(answer.within)} of {answer.scenes} scenes)" for answer in ordered if not answer.is_recommended]
+    others = [
+        f"{answer.engine} (within it in {len(answer.within)} of {answer.scenes} scenes)" for answer in ordered if not answer.is_recommended
+    ]
     question, rest = f"For {_tolerance(answers[0].metric, within)}", ", ".join(others)
     if not used:
-        return f"{question} no engine is recommended: {rest} keep it."
+        return f"{question} no engine is recommended: {rest}."
     return f"{question} use {'; '.join(used)}{f'; not {rest}' if others else ''}."
 
 
@@ -94,7 +97,7 @@ def _exceptions(answer: Answer) -> str:
 def _declined(answer: Answer) -> str:
     """The number of scenes in which an engine has no result."""
     count = answer.scenes - len(answer.within) - len(answer.beyond) - len(answer.undecided)
-    return f" (declines {count})" if count else ""
+    return f" (declines {counted(count, 'scene')})" if count else ""
 
 
 def _cost(results: Results) -> list[str]:

@@ -13,7 +13,9 @@ from dropspin.reports.plots.figures import limits_charts
 from dropspin.reports.stories.numbers import duration, left_out
 from dropspin.reports.stories.study import Study
 
-ACCURATE_AND_STABLE = "Accurate: sound at every smaller tested time step. Stable: there, errors beyond the tolerance are the only failures."
+ACCURATE_AND_STABLE = (
+    "Accurate: sound at every smaller tested time step. Stable: errors beyond the tolerance are the only failures at these steps."
+)
 COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterion", "size", "message")
 
 

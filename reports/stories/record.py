@@ -133,11 +133,11 @@ def summary(release: Release, label: str, dt: float) -> list[str]:
 
 
 def changes_in_words(changed: Sequence[Change]) -> str:
-    """In which releases results changed, and in which of the others scenes have a result that had none, or the reverse."""
+    """The releases in which results changed, and the others in which scenes gained or lost their results."""
     numbers = list(dict.fromkeys(change.release for change in changed if change.metric))
     others = [release for release in dict.fromkeys(change.release for change in changed) if release not in numbers]
     parts = [f"results changed in {', '.join(numbers)}" if numbers else "no result changed"]
-    return "; ".join(parts + ([f"which scenes have results changed in {', '.join(others)}"] if others else []))
+    return "; ".join(parts + ([f"scenes gained or lost results in {', '.join(others)}"] if others else []))
 
 
 def badge(engine: str, release: Release, label: str, dt: float) -> dict[str, Any]:

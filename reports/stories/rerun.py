@@ -43,9 +43,9 @@ def _sentences(found: Again) -> list[str]:
             reasons.append(f"{word(now.verdict).capitalize()}: {now.reason or 'the plan no longer has this time step'}.")
     moved, count = len(found.moved), len(found.cases)
     differ = f"{moved} of {counted(count, 'result')} {'differs' if moved == 1 else 'differ'} from the record."
-    result = differ if moved else "Every result is that of the record, bit for bit."
+    result = differ if moved else "Every result equals that of the record, bit for bit."
     others = "; ".join(f"{name} {now} (in the record: {was})" for name, (was, now) in found.differing.items())
-    surroundings = f"Not as in the record: {others}." if others else "Adapter, versions and machine are those of the record."
+    surroundings = f"Different from the record: {others}." if others else "Adapter, versions and machine are those of the record."
     return [*dict.fromkeys(reasons), result, surroundings]
 
 

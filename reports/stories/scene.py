@@ -9,7 +9,8 @@ from dropspin.scenarios.text import counted
 
 def modelled(scene: Scenario) -> list[str]:
     """The parts of a scene that are simulated."""
-    parts = [f"a {scene.body.description or scene.body.shape} of {scene.body.mass:g} kg"]
+    body = scene.body.description or scene.body.shape
+    parts = [f"{'an' if body[0] in 'aeiou' else 'a'} {body} of {scene.body.mass:g} kg"]
     if scene.gravity is not None:
         parts.append(f"gravity of {np.linalg.norm(scene.acceleration):g} m/s²")
     if scene.floor is not None:
@@ -27,9 +28,9 @@ def modelled(scene: Scenario) -> list[str]:
         linear, angular = scene.damping.factors.values()
         parts[-1] += f", by factors of {linear:g} and {angular:g} per step of {scene.damping.factor_dt:g} s"
     if scene.ensemble is not None:
-        parts.append(f"{scene.ensemble.size} starts drawn around the scene's own")
+        parts.append(f"{counted(scene.ensemble.size, 'start')} drawn around the scene's own")
     if scene.recording is not None:
-        parts.append(f"{counted(len(scene.recording.tosses), 'measured toss', 'measured tosses')}")
+        parts.append(counted(len(scene.recording.tosses), "measured toss", "measured tosses"))
     return parts
 
 

@@ -7,9 +7,9 @@ from dropspin.comparisons.symmetries.twins import LEVELS, TwinFinding
 from dropspin.reports.document import Document, Sentences, Table
 
 LEGEND = (
-    "Steps are the first after which the motions differ at all, and by more than each size, of angles in radians, and relative to sizes "
-    "and speeds; 0 is the start. Rounding explains a difference if the initial state perturbed by 16 eps changes the motion of one of the "
-    "two engines as much."
+    "A step is the first after which the motions differ at all, or by more than the size in the heading, in radians or relative to sizes "
+    "and speeds; step 0 is the start. Rounding explains a difference if the initial state perturbed by 16 eps changes the motion of one "
+    "of the two engines as much."
 )
 
 

@@ -95,7 +95,7 @@ def test_index_has_the_digits_of_the_newest_releases(site):
 
 def test_index_counts_releases_with_results_and_tells_results_from_scenes_that_were_declined_before(site):
     text = Page(site / "index.html").text
-    assert "mujoco : 3 of 4 releases have results; results changed in 3.11.0; which scenes have results changed in 3.10.0 ( badge" in text
+    assert "mujoco : 3 of 4 releases have results; results changed in 3.11.0; scenes gained or lost results in 3.10.0 ( badge" in text
 
 
 def test_page_of_an_engine_counts_the_results_of_others_that_are_the_same(site):

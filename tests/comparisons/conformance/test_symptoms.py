@@ -133,7 +133,7 @@ def test_height_of_the_first_contact_is_stated_only_if_it_is_wrong():
         (
             "impulse at another vertex",
             "corner",
-            "the velocities change in the first contact otherwise than by an impulse at the contact point",
+            "an impulse at the contact point does not explain the change of the velocities in the first contact",
         ),
         ("velocity left from earlier simulations", "repeats", "keeps state between simulations"),
     ],

@@ -26,7 +26,7 @@ def settings(version, solref):
             {},
             [],
             "nothing",
-            "nothing that is recorded differs; the engine is not deterministic, or has changed without a new version",
+            "no recorded property differs; the engine is not deterministic, or has changed without a new version",
         ),
         (settings("1.1", 1), [], "engine", "attributed to the engine: candidate 1.0 → 1.1"),
         (settings("1.0", 2), [], "settings", "attributed to its settings: its settings (solref)"),

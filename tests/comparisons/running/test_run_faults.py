@@ -172,5 +172,5 @@ def test_engine_that_never_moves_fails_restitution():
     """Restitution is undefined without an impact; the other engine is not affected."""
     found = ds.run([BALL], [made.Frozen(), "pybullet"], [4e-3])
     [row] = found.table[(found.table["engine"] == "frozen") & (found.table["metric"] == "restitution_error")].to_dict("records")
-    assert (row["verdict"], row["reason"]) == ("failed", "what it measures did not happen")
+    assert (row["verdict"], row["reason"]) == ("failed", "the event that it measures did not occur")
     assert found.table[found.table["engine"] == "pybullet"]["value"].notna().all()

@@ -126,7 +126,10 @@ def test_address_at_which_something_else_listens_is_refused_in_one_line(answer, 
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with pytest.raises(DropspinError) as caught:
             run_sweep(load_sweep(SPEC), str(tmp_path / "out"), scheduler=address)
-    assert str(caught.value) == f"--scheduler {address}: what listens there does not answer as a scheduler; start one with: dask scheduler."
+    assert (
+        str(caught.value)
+        == f"--scheduler {address}: the program at this address does not answer as a scheduler; start one with: dask scheduler."
+    )
     assert not (tmp_path / "out").exists()
 
 

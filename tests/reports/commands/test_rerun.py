@@ -39,7 +39,7 @@ def test_same_bits(again):
     assert "1 ms  0.0127" in done.stdout
     assert done.stdout.count("the same bits") == 2
     assert done.stdout.endswith(
-        "Every result is that of the record, bit for bit.\nAdapter, versions and machine are those of the record.\n"
+        "Every result equals that of the record, bit for bit.\nAdapter, versions and machine are those of the record.\n"
     )
 
 

@@ -94,7 +94,7 @@ STEP = r"at (?:(?P<any>any step tried)|(?P<dt>\S+) ms(?P<less> or less)?|the fin
 SAID = re.compile(rf"(?P<no>not |undecided for )?(?P<engines>.+?)(?: {STEP}| \((?P<size>\S+) (?:%|rad)\))?(?: in (?P<scenes>.+))?")
 USED = re.compile(
     rf"{STEP}(?:, except (?:with (?P<condition>.+) \((?P<covered>\d+) scenes\))?(?: and )?(?:in (?P<named>.+?))?)?"
-    r"(?:, undecided in (?P<undecided>.+?))?(?: \(declines (?P<declined>\d+)\))?"
+    r"(?:, undecided in (?P<undecided>.+?))?(?: \(declines (?P<declined>\d+) scenes?\))?"
 )
 
 
@@ -172,7 +172,7 @@ def test_each_claim_is_that_of_the_rows(seed):
                 [engine] = [engine for engine in run.engines if clause.startswith(f"{engine} at ")]
                 verify_use(run, metric, engine, clause.removeprefix(f"{engine} "))
             verify_counts(run, metric, not_used)
-        elif none := re.fullmatch(rf"For (.+) {size} no engine is recommended: (.+) keep it\.", sentence):
+        elif none := re.fullmatch(rf"For (.+) {size} no engine is recommended: (.+)\.", sentence):
             assert len(verify_counts(run, METRICS[none[1]], none[2])) > 0
         elif few := re.fullmatch(rf"(.+) {size}: (.+)\.", sentence):
             verify_statement(run, METRICS[few[1].lower()], few[2])
@@ -181,7 +181,7 @@ def test_each_claim_is_that_of_the_rows(seed):
 
 
 def verify_counts(run, metric, text):
-    found = re.findall(r"(.+?) \((\d+) of (\d+) scenes\)(?:, |$)", text)
+    found = re.findall(r"(.+?) \(within it in (\d+) of (\d+) scenes\)(?:, |$)", text)
     for engine, within, scenes in found:
         assert engine in run.engines
         verify_count(run, metric, engine, int(within), int(scenes))

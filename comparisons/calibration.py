@@ -103,13 +103,13 @@ def calibrate(
     entry, scene = present_entry(engine), drop(restitution, friction, shape)
     verify_time_step(scene, dt)
     with EngineProcesses(resources) as processes:
-        found = processes.call(entry, _calibrated, scene, dt)
-    if isinstance(found, Breakdown):
-        what = "cannot be calibrated" if found.verdict == "declined" else "broke down with these settings"
-        raise DropspinError(f"{entry.label} {what}: {found.reason}.")
-    if found is None:
+        calibrated = processes.call(entry, _calibrated, scene, dt)
+    if isinstance(calibrated, Breakdown):
+        failure = "cannot be calibrated" if calibrated.verdict == "declined" else "broke down with these settings"
+        raise DropspinError(f"{entry.label} {failure}: {calibrated.reason}.")
+    if calibrated is None:
         raise DropspinError(f"{entry.label} has no settings to calibrate; use mujoco or pybullet.")
-    return found
+    return calibrated
 
 
 def drop(restitution: float, friction: str | float = "none", shape: Shape = "ball") -> Scenario:
@@ -200,4 +200,4 @@ def _largest_step(motion: Motion, dt: float) -> tuple[float, str]:
 
 def _is_stable(motion: Motion, dt: float) -> bool:
     drops = [np.array(motion(DROP + IMPACT * dt * part, math.ceil(LONG / dt), dt)[0]) for part in (np.arange(DROPS) + 0.5) / DROPS]
-    return all(bool(np.isfinite(one).all() and one.max() <= GAIN * one[0] and one[-1] > -SUNK) for one in drops)
+    return all(bool(np.isfinite(height).all() and height.max() <= GAIN * height[0] and height[-1] > -SUNK) for height in drops)

@@ -62,15 +62,15 @@ def conform(
         EngineBroken: It cannot be imported or constructed.
     """
     verify_known("check", checks, CHECKS)
-    entry, found = present_entry(engine), []
+    entry, results = present_entry(engine), []
     with tempfile.TemporaryDirectory() as folder, EngineProcesses(resources) as processes:
         for check in checks or CHECKS:
             result = processes.call(entry, run_check, check, folder)
             if isinstance(result, Breakdown):
                 result = CheckResult(check, cast(CheckOutcome, result.verdict), result.reason)
-            found.append(result)
+            results.append(result)
             (on_result or ignore)(result)
-    return found
+    return results
 
 
 def run_check(entry: EngineEntry, check: str, folder: str | None = None) -> CheckResult:

@@ -119,14 +119,14 @@ def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:
     row = int(np.argmax(case.states.touching))
     before = motion.states[row].copy()
     before[VELOCITY] += case.dt * scene.acceleration
-    velocities, found = (np.concatenate([state[VELOCITY], state[SPIN]]) for state in (before, motion.states[row + 1]))
+    velocities, after = (np.concatenate([state[VELOCITY], state[SPIN]]) for state in (before, motion.states[row + 1]))
     axes = rotate(before[ORIENTATION], np.eye(3)).T
     contact = Contact(velocities, case.contact_point(row), scene.body.mass, scene.body.inertia_tensor, axes, scene.floor)
     weights = np.array([1.0] * 3 + [scene.body.size] * 3)
 
     def explains(predicted: Array | None) -> bool:
-        scale = np.linalg.norm(weights * (found - velocities))
-        return predicted is not None and bool(np.linalg.norm(weights * (found - predicted)) <= CLOSE * scale)
+        scale = np.linalg.norm(weights * (after - velocities))
+        return predicted is not None and bool(np.linalg.norm(weights * (after - predicted)) <= CLOSE * scale)
 
     if contact.approach[1] >= 0.0:
         return None
@@ -193,23 +193,23 @@ def check_later_impacts(engine: Engine) -> str:
     decay = decaying_restitution(engine)
     if decay is not None:
         raise CheckFailed(decay)
-    found = restitutions(engine)
-    if len(found) >= FEWEST and abs(found[1][0] - found[0][0]) > CHANGED * found[0][0]:
-        raise Noted(f"restitution depends on the speed: {', '.join(f'{e:.3g} at {speed:.3g} m/s' for e, speed in found)}")
-    return f"restitution in successive impacts: {', '.join(f'{e:.3g}' for e, _ in found)}"
+    bounces = restitutions(engine)
+    if len(bounces) >= FEWEST and abs(bounces[1][0] - bounces[0][0]) > CHANGED * bounces[0][0]:
+        raise Noted(f"restitution depends on the speed: {', '.join(f'{e:.3g} at {speed:.3g} m/s' for e, speed in bounces)}")
+    return f"restitution in successive impacts: {', '.join(f'{e:.3g}' for e, _ in bounces)}"
 
 
 def decaying_restitution(engine: Engine) -> str | None:
     """A message if restitution falls from impact to impact, whatever the speed of the fall; None if it does not."""
-    found = restitutions(engine)
-    if len(found) < FEWEST or any(later[0] > (1.0 - FALL) * one[0] for one, later in pairwise(found)):
+    bounces = restitutions(engine)
+    if len(bounces) < FEWEST or any(later[0] > (1.0 - FALL) * earlier[0] for earlier, later in pairwise(bounces)):
         return None
-    close = SAME * (found[0][0] - found[1][0])
-    for speed in (found[1][1], 1.2 * found[0][1]):
+    close = SAME * (bounces[0][0] - bounces[1][0])
+    for speed in (bounces[1][1], 1.2 * bounces[0][1]):
         others = restitutions(engine, speed)
-        if not others or any(abs(one[0] - other[0]) > close for one, other in zip(found[:2], others, strict=False)):
+        if not others or any(abs(first[0] - second[0]) > close for first, second in zip(bounces[:2], others, strict=False)):
             return None
-    return f"{LATER}: {', '.join(rounded(e, 2) for e, _ in found)} in successive impacts; a scene has one restitution for all of them"
+    return f"{LATER}: {', '.join(rounded(e, 2) for e, _ in bounces)} in successive impacts; a scene has one restitution for all of them"
 
 
 def restitutions(engine: Engine, speed: float | None = None) -> list[tuple[float, float]]:

@@ -48,20 +48,20 @@ def check_motion(engine: Engine, probe: Probe) -> str:
     if refusal is not None:
         raise Declined(refusal)
     recording = record(engine, probe.scene, DT, verify=False)
-    found, exact = recording.motion.states[probe.rows], probe.exact
-    if probe.off(found, exact) <= 1.0:
-        position, attitude, velocity, spin = differences(found, exact)
+    states, exact = recording.motion.states[probe.rows], probe.exact
+    if probe.off(states, exact) <= 1.0:
+        position, attitude, velocity, spin = differences(states, exact)
         return f"errors: {position:.2g} m, {attitude:.2g} rad, {velocity:.2g} m/s, {spin:.2g} rad/s"
-    explaining = [limitation.message for limitation in recording.limitations if _explains(limitation, found, exact, probe)]
+    explaining = [limitation.message for limitation in recording.limitations if _explains(limitation, states, exact, probe)]
     if explaining:
         raise Noted("; ".join(explaining))
-    law = _own_law(engine, probe, found)
+    law = _own_law(engine, probe, states)
     if law is not None:
         raise Noted(f"impacts follow the {law} law, as the engine states")
     mistake = _in_impacts(engine, probe, recording.motion)
     if mistake is not None:
         raise mistake
-    fault = explain_motion(probe, found, lambda other: _states(engine, other))
+    fault = explain_motion(probe, states, lambda other: _states(engine, other))
     if fault is None:
         raise CheckFailed("; ".join(symptoms(probe, recording.motion)))
     raise Noted(fault.message) if fault.is_peculiarity else CheckFailed(fault.message)
@@ -83,24 +83,24 @@ def _states(engine: Engine, probe: Probe) -> Array | None:
     return None if isinstance(recording, Breakdown) else recording.motion.states[probe.rows]
 
 
-def _own_law(engine: Engine, probe: Probe, found: Array) -> Law | None:
+def _own_law(engine: Engine, probe: Probe, states: Array) -> Law | None:
     """The impact law that an engine names in its discretisation, if its motion follows that law."""
     named = engine.discretisation(probe.scene) or ""
     for law in LAWS:
         truth = truth_for(probe.scene, law) if f"law {law}" in named else None
-        if truth is not None and probe.off(found, truth(probe.times).states) <= 1.0:
+        if truth is not None and probe.off(states, truth(probe.times).states) <= 1.0:
             return law
     return None
 
 
-def _explains(limitation: KnownLimitation, found: Array, exact: Array, probe: Probe) -> bool:
+def _explains(limitation: KnownLimitation, states: Array, exact: Array, probe: Probe) -> bool:
     """Whether a known limitation explains the errors of position and attitude, and with them those of the velocities."""
-    explained, (position, attitude, _, _) = limitation.explained_errors, differences(found, exact)
+    explained, (position, attitude, _, _) = limitation.explained_errors, differences(states, exact)
     errors = zip(("position_error", "orientation_error"), (position, attitude), probe.allowed, strict=False)
-    return bool(explained) and all(error <= max(explained.get(name, 0.0), own) for name, error, own in errors)
+    return bool(explained) and all(error <= max(explained.get(name, 0.0), allowed) for name, error, allowed in errors)
 
 
-def explain_motion(probe: Probe, found: Array, motion_of: Callable[[Probe], Array | None]) -> Fault | None:
+def explain_motion(probe: Probe, states: Array, motion_of: Callable[[Probe], Array | None]) -> Fault | None:
     """The fault, or the two, that give an engine's states of a probe, shape (2, 13); None if there are none.
 
     Several faults may give the same motion of a probe. A fault is no explanation if it changes the motion of another probe in which the
@@ -108,7 +108,7 @@ def explain_motion(probe: Probe, found: Array, motion_of: Callable[[Probe], Arra
 
     Args:
         probe: The probe.
-        found: The engine's states of it.
+        states: The engine's states of it.
         motion_of: Function from another probe to the engine's states of it, or to None if the engine has none.
     """
     # The exact solution of a box on its corner takes too long for thousands of pairs.
@@ -116,7 +116,7 @@ def explain_motion(probe: Probe, found: Array, motion_of: Callable[[Probe], Arra
     shapes = {*Engine.shapes, probe.scene.body.shape}
     for count in counts:
         motions = _motions_with_faults(probe, count)
-        off = dict(zip(motions, np.round(probe.off(found, np.array([*motions.values()])), 3), strict=True))
+        off = dict(zip(motions, np.round(probe.off(states, np.array([*motions.values()])), 3), strict=True))
         candidates = sorted((fault for fault in motions if off[fault] <= 1.0), key=off.__getitem__)
         others = [other for other in PROBES if other != probe and other.scene.body.shape in shapes and (count == 1 or _has_pairs(other))]
         best = _best(candidates, others, motion_of)
@@ -135,13 +135,13 @@ def _best(candidates: Iterable[Fault], probes: Iterable[Probe], motion_of: Calla
     for probe in probes:
         exact, motions = probe.exact, _motions(probe, explained)
         changed = {fault: states for fault, states in motions.items() if probe.off(states, exact) > 1.0}
-        found = motion_of(probe) if changed else None
-        if found is None:
+        of_engine = motion_of(probe) if changed else None
+        if of_engine is None:
             continue
         for fault, states in changed.items():
-            if probe.off(found, states) <= 1.0:
+            if probe.off(of_engine, states) <= 1.0:
                 explained[fault] += 1
-            elif probe.off(found, exact) <= 1.0:
+            elif probe.off(of_engine, exact) <= 1.0:
                 del explained[fault]
     return max(explained, key=explained.__getitem__, default=None)
 
@@ -191,13 +191,13 @@ def symptoms(probe: Probe, motion: Trajectory) -> Iterator[str]:
 
 def _of_flight(scene: Scenario, end: Array, exact: Array) -> Iterator[str]:
     """Speeds at the end of a motion without gravity and floor."""
-    for what, unit, part in (("speed", "m/s", VELOCITY), ("angular velocity", "rad/s", SPIN)):
+    for quantity, unit, part in (("speed", "m/s", VELOCITY), ("angular velocity", "rad/s", SPIN)):
         final, expected = (float(np.linalg.norm(state[part])) for state in (end, exact))
         if abs(final - expected) > CLEAR * expected:
             too_fast, too_slow = "", "damping or a clamp that the scene does not have: "
             if scene.damping is not None:
                 too_fast, too_slow = "damping is missing or too weak: ", "damping is too strong, or a clamp: "
-            yield f"{too_slow if final < expected else too_fast}the final {what} is {_instead(final, expected, unit)}"
+            yield f"{too_slow if final < expected else too_fast}the final {quantity} is {_instead(final, expected, unit)}"
 
 
 def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
@@ -220,10 +220,10 @@ def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
         end = case.impacts[1] if len(case.impacts) > 1 else times[-1]
         after = min(max(after, int(np.searchsorted(times, case.impacts[0] + step))), int(np.searchsorted(times, end - step)))
     duration = (after - before) * case.dt
-    found, exact = (rows.velocity[after] - rows.velocity[before] - duration * scene.acceleration for rows in (case.motion, case.exact))
-    if case.impacts and abs(found[1] - exact[1]) > allowed:
+    change, exact = (rows.velocity[after] - rows.velocity[before] - duration * scene.acceleration for rows in (case.motion, case.exact))
+    if case.impacts and abs(change[1] - exact[1]) > allowed:
         sampled = Comparison(scene, case.exact, case.exact, case.impacts)
-        wrong, right = (METRICS["restitution_error"].value_or_nan([one]) for one in (case, sampled))
+        wrong, right = (METRICS["restitution_error"].value_or_nan([compared]) for compared in (case, sampled))
         if abs(wrong - right) > CLEAR:
             yield f"restitution is {_instead(scene.floor.restitution + wrong - right, scene.floor.restitution)}"
     moment = METRICS["contact_momentum_error"]
@@ -232,30 +232,30 @@ def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
             "an impulse at the contact point does not explain the change of the velocities in the first contact: the angular momentum "
             f"about it changes by {turned:.2g} of mass × distance from the centre × speed"
         )
-    if float(np.linalg.norm((found - exact)[[0, 2]])) > allowed:
-        yield from _of_friction(found, exact)
+    if float(np.linalg.norm((change - exact)[[0, 2]])) > allowed:
+        yield from _of_friction(change, exact)
 
 
-def _of_friction(found: Array, exact: Array) -> Iterator[str]:
+def _of_friction(change: Array, exact: Array) -> Iterator[str]:
     """The size of the friction impulse over the normal one, and its direction."""
-    strength, expected = (float(np.linalg.norm(impulse[[0, 2]]) / impulse[1]) for impulse in (found, exact))
+    strength, expected = (float(np.linalg.norm(impulse[[0, 2]]) / impulse[1]) for impulse in (change, exact))
     if abs(strength - expected) > CLEAR:
         yield f"the impulse of friction over that of the normal force is {_instead(strength, expected)}"
-    angle = abs(math.remainder(math.atan2(found[0], found[2]) - math.atan2(exact[0], exact[2]), math.tau))
+    angle = abs(math.remainder(math.atan2(change[0], change[2]) - math.atan2(exact[0], exact[2]), math.tau))
     if strength > CLEAR and expected > CLEAR and angle > TURNED:
         yield f"friction acts {rounded(math.degrees(angle), 2)}° from its exact direction"
 
 
-def _instead(found: float, expected: float, unit: str = "") -> str:
+def _instead(got: float, expected: float, unit: str = "") -> str:
     """Two numbers with so many digits that they differ, and the difference as a share of the expected one."""
-    value = f"{found:.{_digits(found, expected)}g}{f' {unit}' if unit else ''} instead of {rounded(expected, 6)}"
+    value = f"{got:.{_digits(got, expected)}g}{f' {unit}' if unit else ''} instead of {rounded(expected, 6)}"
     if expected == 0.0:
         return value
-    if found * expected < 0.0:
+    if got * expected < 0.0:
         return f"{value} (of the opposite sign)"
-    return f"{value} ({rounded(100.0 * abs(found / expected - 1.0), 2)} % too {'high' if abs(found) > abs(expected) else 'low'})"
+    return f"{value} ({rounded(100.0 * abs(got / expected - 1.0), 2)} % too {'high' if abs(got) > abs(expected) else 'low'})"
 
 
-def _digits(found: float, expected: float) -> int:
+def _digits(got: float, expected: float) -> int:
     """Significant digits in which two numbers differ."""
-    return 2 + max(0, math.ceil(math.log10(abs(expected / (found - expected))))) if expected and found != expected else 3
+    return 2 + max(0, math.ceil(math.log10(abs(expected / (got - expected))))) if expected and got != expected else 3

@@ -48,8 +48,8 @@ OUTCOMES: dict[type[Exception], CheckOutcome] = {CheckFailed: "failed", BuildMis
 def described(error: Exception, engine: Engine) -> str:
     """The type and the text of an exception, and the innermost line of the adapter's file that it passed through, if any."""
     file = getattr(sys.modules.get(type(engine).__module__), "__file__", None)
-    own = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
-    where = f" ({os.path.relpath(own[-1].filename)}:{own[-1].lineno}, in {own[-1].name})" if own else ""
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+    where = f" ({os.path.relpath(frames[-1].filename)}:{frames[-1].lineno}, in {frames[-1].name})" if frames else ""
     return exceptions.described(error) + where
 
 

@@ -48,16 +48,16 @@ class Probe(NamedTuple):
         """The states of the exact solution at these times, shape (2, 13)."""
         return exact_solution(self.scene)(self.times).states
 
-    def off(self, found: Array, expected: Array) -> Array:
+    def off(self, states: Array, expected: Array) -> Array:
         """The largest difference of states, shape (2, 13), from others, shape (..., 2, 13), over the allowed one; inf if not finite."""
-        worst = np.max(differences(found, expected) / np.array(self.allowed), axis=-1)
+        worst = np.max(differences(states, expected) / np.array(self.allowed), axis=-1)
         return np.where(np.isfinite(worst), worst, np.inf)
 
 
-def differences(found: Array, expected: Array) -> Array:
+def differences(states: Array, expected: Array) -> Array:
     """The largest differences of position [m], attitude [rad], velocity [m/s], angular velocity [rad/s], shape (..., 4)."""
-    position, velocity, spin = (np.linalg.norm(found[..., part] - expected[..., part], axis=-1) for part in (POSITION, VELOCITY, SPIN))
-    turned = angle_between_orientations(found[..., ORIENTATION], expected[..., ORIENTATION])
+    position, velocity, spin = (np.linalg.norm(states[..., part] - expected[..., part], axis=-1) for part in (POSITION, VELOCITY, SPIN))
+    turned = angle_between_orientations(states[..., ORIENTATION], expected[..., ORIENTATION])
     return np.stack([position, turned, velocity, spin], axis=-1).max(axis=-2)
 
 

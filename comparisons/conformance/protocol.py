@@ -138,15 +138,15 @@ def check_record(engine: Engine) -> str:
     return "record and advance take the same steps, bit for bit"
 
 
-def _verify_equal(found: Array, expected: Array, message: str) -> None:
-    difference = relative_difference(found, expected)
+def _verify_equal(values: Array, expected: Array, message: str) -> None:
+    difference = relative_difference(values, expected)
     if not difference <= ROUNDING:
         raise CheckFailed(f"{message} (relative difference {difference:.2g})")
 
 
-def relative_difference(found: Array, expected: Array) -> float:
+def relative_difference(values: Array, expected: Array) -> float:
     """The largest difference relative to the largest number; infinite if one is not finite."""
-    difference = float(np.max(np.abs(found - expected)) / np.max(np.abs(expected)))
+    difference = float(np.max(np.abs(values - expected)) / np.max(np.abs(expected)))
     return difference if np.isfinite(difference) else float("inf")
 
 
@@ -193,8 +193,8 @@ def check_repeats(engine: Engine) -> str:
     return "a scene gives the same bits when it runs again, after another scene, and in turn with a second simulation"
 
 
-def _same(one: Array, other: Array) -> bool:
-    return np.array_equal(one, other, equal_nan=True)
+def _same(first: Array, second: Array) -> bool:
+    return np.array_equal(first, second, equal_nan=True)
 
 
 def check_files(engine: Engine) -> str:

@@ -52,20 +52,20 @@ SIZES = (Size(3, DT, 256), Size(START_PHASES, 2.0 * DT, 16))
 
 def check_symmetries(engine: Engine) -> str:
     """Scenes seen from elsewhere and in other units have the same motion."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for names in (FLIGHTS, RICHEST):
         scene = whole_steps(accepted_scene(engine, *names), DT, A_FEW_STEPS)
         motion = record(engine, scene, DT).motion  # an exception of the adapter ends the check
         if motion.first_bad_row is None:
-            found += findings_of(EngineEntry(engine.label, engine), scene, DT, motion.states, SYMMETRIES)
-    lost = {one.symmetry: one for one in sorted(found, key=lambda one: one.difference) if one.status == "lost"}
+            findings += findings_of(EngineEntry(engine.label, engine), scene, DT, motion.states, SYMMETRIES)
+    lost = {finding.symmetry: finding for finding in sorted(findings, key=lambda finding: finding.difference) if finding.status == "lost"}
     if lost:
-        named = "; ".join(f"{name}: by {one.difference:.2g} from step {one.step} on" for name, one in lost.items())
+        named = "; ".join(f"{name}: by {finding.difference:.2g} from step {finding.step} on" for name, finding in lost.items())
         raise Noted(f"the motion differs if the scene is transformed; {named} (dropspin symmetries shows more)")
-    compared = {one.symmetry for one in found if one.status != "not run"}
+    compared = {finding.symmetry for finding in findings if finding.status != "not run"}
     if not compared:
-        raise Declined(f"no symmetry could be compared: {found[0].reason if found else 'the motion is not finite'}")
-    scenes = " and ".join(dict.fromkeys(one.scene for one in found))
+        raise Declined(f"no symmetry could be compared: {findings[0].reason if findings else 'the motion is not finite'}")
+    scenes = " and ".join(dict.fromkeys(finding.scene for finding in findings))
     return f"{counted(len(compared), 'symmetry is', 'symmetries are')} kept in {scenes}"
 
 
@@ -128,9 +128,9 @@ def _verify_batches(engine: Engine, members: Sequence[Scenario], size: Size, fir
     _verify_calls(engine, more[:, 0], end, "a second record does not begin at the current states")
 
 
-def _verify_calls(engine: Engine, found: Array, expected: Array, message: str) -> None:
+def _verify_calls(engine: Engine, states: Array, expected: Array, message: str) -> None:
     """States that a batch computes by different calls are the same; rounding may differ with the number of steps in a call."""
-    difference = relative_difference(found, expected)
+    difference = relative_difference(states, expected)
     if not difference <= max(ROUNDING, STEP_MULTIPLE * float(np.finfo(engine.precision).eps)):
         raise CheckFailed(f"{message}, by {difference:.2g} of the largest number")
 
@@ -150,7 +150,7 @@ def _verify_single(engine: Engine, member: Scenario, dt: float, rows: Array, lag
     # A compiler vectorises a batch differently from a single simulation, and rounding depends on that.
     effects = partial(effects_of_rounding, entry, member, dt, alone.states) if engine.compiles else None
     none = Finding(member.name, engine.label, "", "not run")
-    found = judged(none, member, dt, [(alone.states, rows)], effects, engine.precision)
-    if found.status not in ("kept", "rounding"):
-        since = f"from step {found.step} on, by {found.difference:.2g} of sizes and speeds"
+    finding = judged(none, member, dt, [(alone.states, rows)], effects, engine.precision)
+    if finding.status not in ("kept", "rounding"):
+        since = f"from step {finding.step} on, by {finding.difference:.2g} of sizes and speeds"
         raise CheckFailed(f"simulation {number + 1} differs from the same one by itself {since}")

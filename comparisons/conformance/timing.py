@@ -65,8 +65,8 @@ def check_time(engine: Engine) -> str:
     if not np.allclose(lengths, STEPS_TRIED, rtol=NEAR_ENOUGH):
         if np.ptp(lengths) <= NEAR_ENOUGH * abs(lengths[0]):
             raise CheckFailed(f"a step is {lengths[0]:.5g} s long for every dt ({asked} s)")
-        found = ", ".join(f"{length:.5g}" for length in lengths)
-        raise CheckFailed(f"steps of {asked} s are {found} s long, by the motion of a free ball")
+        measured = ", ".join(f"{length:.5g}" for length in lengths)
+        raise CheckFailed(f"steps of {asked} s are {measured} s long, by the motion of a free ball")
     with suppress(Declined):
         late = _late(_ticks(engine, "turning", STEPS_TRIED[0], _by_attitude))
         if abs(late) > LATE:
@@ -221,7 +221,7 @@ def check_compilation(engine: Engine) -> str:
         if compiling < MUCH:
             return "the engine does not compile for long"
         raise Noted(f"the first simulation takes {compiling:.2g} s longer than the second; set compiles = True")
-    found = f"a scene compiles in {max(compiling, 0.0):.2g} s; a simulation of {A_FEW_STEPS} steps then takes {rounded(1e3 * later, 2)} ms"
+    cost = f"a scene compiles in {max(compiling, 0.0):.2g} s; a simulation of {A_FEW_STEPS} steps then takes {rounded(1e3 * later, 2)} ms"
     if again > 0.25 * compiling and again > MUCH / 10.0:  # the first simulation may compile for two numbers of steps, 1 and others
-        raise Noted(f"{found}; with another number of steps it compiles again, for {again:.2g} s")
-    return found
+        raise Noted(f"{cost}; with another number of steps it compiles again, for {again:.2g} s")
+    return cost

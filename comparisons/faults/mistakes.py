@@ -84,12 +84,12 @@ class Mistake:
         linear, angular = (scene.damping.linear, scene.damping.angular) if scene.damping else (0.0, 0.0)
         factors = [float(np.linalg.norm(rate)) if square else 1.0 for rate, square in zip((v, w), self.squares, strict=True)]
         turning = float(np.linalg.norm(w)) if self.turning is None else self.turning
-        found, spin = np.empty(13), np.append(0.5 * turning * w, 0.0)
-        found[POSITION], found[VELOCITY] = v, scene.acceleration - linear * factors[0] * v
-        found[ORIENTATION] = multiply(q, spin) if self.swapped else multiply(spin, q)
+        change, spin = np.empty(13), np.append(0.5 * turning * w, 0.0)
+        change[POSITION], change[VELOCITY] = v, scene.acceleration - linear * factors[0] * v
+        change[ORIENTATION] = multiply(q, spin) if self.swapped else multiply(spin, q)
         unit = q / np.linalg.norm(q)
-        found[SPIN] = self.acceleration(unit, w, scene.body.inertia_tensor) - angular * factors[1] * w
-        return found
+        change[SPIN] = self.acceleration(unit, w, scene.body.inertia_tensor) - angular * factors[1] * w
+        return change
 
 
 @lru_cache(maxsize=1024)
@@ -99,9 +99,9 @@ def _integrated(mistake: Mistake, scene: Scenario, times: tuple[float, ...]) -> 
     def rates(_: float, state: Array) -> Array:
         return mistake.rates(scene, state)
 
-    found = solve_ivp(rates, (0.0, times[-1]), scene.initial_state, "DOP853", times, rtol=ACCURACY, atol=ACCURACY).y.T
-    found[:, ORIENTATION] /= np.linalg.norm(found[:, ORIENTATION], axis=1, keepdims=True)
-    return np.asarray(found)
+    states = solve_ivp(rates, (0.0, times[-1]), scene.initial_state, "DOP853", times, rtol=ACCURACY, atol=ACCURACY).y.T
+    states[:, ORIENTATION] /= np.linalg.norm(states[:, ORIENTATION], axis=1, keepdims=True)
+    return np.asarray(states)
 
 
 MISTAKES = (
@@ -121,5 +121,5 @@ MISTAKES = (
     Mistake(NOT_ROTATED, _not_rotated),
     Mistake(ROTATED_BACK, _rotated_back),
     Mistake(NOT_INVERTED, _not_inverted),
-    Mistake("the gyroscopic term has the opposite sign: ω' = I⁻¹ (I ω × ω) without torque", lambda *given: -_gyroscopic(*given)),
+    Mistake("the gyroscopic term has the opposite sign: ω' = I⁻¹ (I ω × ω) without torque", lambda *args: -_gyroscopic(*args)),
 )

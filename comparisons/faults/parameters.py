@@ -80,7 +80,7 @@ def _scaled(size: str, by: float) -> Simulated:
     def scaled(scene: Scenario) -> Scenario:
         if scene.floor is None or size not in type(scene.body).model_fields:
             return scene
-        larger = {size: lambda given: np.multiply(given, by).tolist()}
+        larger = {size: lambda values: np.multiply(values, by).tolist()}
         return with_values(scene, "body", inertia=scene.body.moments, **larger)
 
     return scaled

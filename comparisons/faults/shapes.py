@@ -30,8 +30,8 @@ def _built_as(kind: type[Shape], instead: Instead, inertia: str = "") -> Simulat
         body = scene.body
         if not isinstance(body, kind):
             return scene
-        own = {"mass": body.mass, "inertia": inertia or body.inertia_tensor.tolist(), "center_of_mass": body.centre.tolist()}
-        return scene.model_copy(update={"body": BODY.validate_python(own | dict(instead(body)))})
+        content = {"mass": body.mass, "inertia": inertia or body.inertia_tensor.tolist(), "center_of_mass": body.centre.tolist()}
+        return scene.model_copy(update={"body": BODY.validate_python(content | dict(instead(body)))})
 
     return simulated
 

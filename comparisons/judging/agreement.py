@@ -41,10 +41,10 @@ def judge_agreement(
         yield metric, judgement
 
 
-def _paired(one: Comparison, other: Comparison) -> Comparison:
+def _paired(first: Comparison, second: Comparison) -> Comparison:
     """The motions of two engines up to the horizon of the exact solution, or, without one, up to the first contact of either engine."""
-    if one.reference is not None:
-        return Comparison.between(one, other, len(one.reference))
-    contacts = [case.first_contact for case in (one, other)]
-    until = max(2, min([len(one.motion), *(contact[0] + 1 for contact in contacts if contact is not None)]))
-    return Comparison(one.scene, one.motion[:until], other.motion[:until])
+    if first.reference is not None:
+        return Comparison.between(first, second, len(first.reference))
+    contacts = [case.first_contact for case in (first, second)]
+    until = max(2, min([len(first.motion), *(contact[0] + 1 for contact in contacts if contact is not None)]))
+    return Comparison(first.scene, first.motion[:until], second.motion[:until])

@@ -106,25 +106,25 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     floor = negligible(scene, metric.unit)
     length = error_budget(dts, errors, claim.order, STANDARD_DEVIATIONS * resolutions, rounded, signed=metric.signed, negligible=floor)
     vector = _budget_of_components(scene, claim, metric, series, np.isfinite(errors), rounded)
-    found = length if vector is None else _corrected(length, vector, finest=abs(float(errors[np.argmin(dts)])))
+    budget = length if vector is None else _corrected(length, vector, finest=abs(float(errors[np.argmin(dts)])))
     order_tolerance = math.nan
-    if found.dts and metric.name not in JUMPING:
-        used = np.isin(dts, found.dts)
+    if budget.dts and metric.name not in JUMPING:
+        used = np.isin(dts, budget.dts)
         logs = np.log(dts[used]) - np.mean(np.log(dts[used]))
         shares = np.array([point.tolerance for point in series])[used] / np.abs(errors[used])
         order_tolerance = float(np.sum(np.abs(logs) * shares) / np.sum(logs**2))
-    is_undecided = found.cause == "unresolved" or (found.cause == "discretisation" and vector is not None and vector.cause == "unresolved")
-    is_open = is_undecided and not math.isnan(found.asymptotic_error) and float(np.nanmax(np.abs(errors))) > floor
-    return Convergence(found, float(np.min(dts)), order_tolerance, is_open, remark)
+    deciding = budget if vector is None or budget.cause != "discretisation" else vector
+    is_open = deciding.cause == "unresolved" and not math.isnan(budget.asymptotic_error) and float(np.nanmax(np.abs(errors))) > floor
+    return Convergence(budget, float(np.min(dts)), order_tolerance, is_open, remark)
 
 
-def beside_recording(found: Convergence, uncertainty: float) -> Convergence:
+def beside_recording(result: Convergence, uncertainty: float) -> Convergence:
     """The convergence of the difference from a recording, which leaves an uncertainty: what remains as dt → 0 is not the engine's alone.
 
     Its interval is widened by the uncertainty. A difference that is not larger is no error; of a larger one, the recording does not tell
     what is due to the model, to the settings and to the start. It has no order.
     """
-    budget = found.budget
+    budget = result.budget
     lower, upper = max(budget.lower - uncertainty, 0.0), budget.upper + uncertainty
     cause, reason = "unresolved", f"finer time steps are needed to tell it from the uncertainty of the recording, {uncertainty:.2g}"
     if lower > 0.0:
@@ -133,7 +133,7 @@ def beside_recording(found: Convergence, uncertainty: float) -> Convergence:
         cause, reason = WITHIN_UNCERTAINTY, f"within the uncertainty of the recording, {uncertainty:.2g}"
     elif math.isnan(budget.asymptotic_error) or budget.cause == "unresolved":
         reason = budget.reason
-    return replace(found, budget=ErrorBudget(cause, reason, budget.asymptotic_error, lower, upper))
+    return replace(result, budget=ErrorBudget(cause, reason, budget.asymptotic_error, lower, upper))
 
 
 def _corrected(length: ErrorBudget, vector: ErrorBudget, finest: float) -> ErrorBudget:
@@ -181,8 +181,8 @@ def _budget_of_components(
     if not is_sufficient([dt for dt, _, _ in kept]):
         return None
     flights = min(len(components.parts) for _, components, _ in kept)
-    _, finest, _ = min(kept, key=lambda one: one[0])
+    _, finest, _ = min(kept, key=lambda row: row[0])
     longest = int(np.argmax(np.linalg.norm(finest.parts[:flights], axis=1)))
     errors, resolutions = (np.array([components[field][longest] for _, components, _ in kept]) for field in range(2))
-    dts, largest = (np.array([one[field] for one in kept]) for field in (0, 2))
+    dts, largest = (np.array([row[field] for row in kept]) for field in (0, 2))
     return vector_budget(dts, errors, claim.order, STANDARD_DEVIATIONS * resolutions, largest, negligible(scene, metric.unit))

@@ -162,8 +162,8 @@ def error_budget(
     unit = 2.0 ** (math.frexp(float(np.max(np.abs([e, noise, floor]))))[1] - 1)
     e, noise, floor, negligible = e / unit, noise / unit, floor / unit, min(max(negligible, float(floor[-1])) / unit, FAR)
     small = np.hypot(noise, floor)
-    found = extrapolate(h, e, small, claimed_order, signed=signed, one_start=resolution is None)
-    cause, limit = _attributed(h, e, found, negligible, float(noise[-1]), judged_together)
+    posterior = extrapolate(h, e, small, claimed_order, signed=signed, one_start=resolution is None)
+    cause, limit = _attributed(h, e, posterior, negligible, float(noise[-1]), judged_together)
     order, fitted = fitted_order(h, e if cause == "discretisation" else e - limit[0], small)
     is_slow = cause == "model" and order < ORDERS[0] and max(limit[1], -limit[2]) < abs(float(e[-1]) - limit[0])
     if is_slow:
@@ -172,7 +172,7 @@ def error_budget(
     if cause == "unresolved":
         return ErrorBudget(cause, SLOW if is_slow else _why_unresolved(e, noise, floor), *in_units)
     has_order = not math.isnan(order)
-    orders = (min(found.order_lower, order), max(found.order_upper, order)) if has_order else (math.nan, math.nan)
+    orders = (min(posterior.order_lower, order), max(posterior.order_upper, order)) if has_order else (math.nan, math.nan)
     power = f" as dt^{order:.2f} ({orders[0]:.2f} to {orders[1]:.2f})" if is_determined(*orders) else ""
     return ErrorBudget(cause, _trend(cause, e, limit, power, negligible, unit), *in_units, order, *orders, fitted)
 
@@ -194,43 +194,43 @@ def vector_budget(
         rounding: Shape (n,).
         negligible: The same for each component.
     """
-    found = [
+    budgets = [
         error_budget(dts, errors, claimed_order, noise, rounding, negligible=negligible, judged_together=components.shape[1])
         for errors, noise in zip(components.T, resolution.T, strict=True)
     ]
-    causes = {one.cause for one in found}
+    causes = {budget.cause for budget in budgets}
     if np.isfinite(components).all(axis=1).sum() <= FEWEST_TIME_STEPS and "model" in causes:
         causes = {"unresolved"}
     cause = next(cause for cause in ("model", "unresolved", "discretisation", "rounding") if cause in causes)
-    most = max(found, key=lambda one: (one.cause == cause, abs(one.asymptotic_error)))
-    nearest = math.hypot(*(max(one.lower, -one.upper, 0.0) for one in found)) if cause == "model" else 0.0
-    farthest = math.hypot(*(max(-one.lower, one.upper) for one in found))
-    length = math.hypot(*(one.asymptotic_error for one in found))
+    most = max(budgets, key=lambda budget: (budget.cause == cause, abs(budget.asymptotic_error)))
+    nearest = math.hypot(*(max(budget.lower, -budget.upper, 0.0) for budget in budgets)) if cause == "model" else 0.0
+    farthest = math.hypot(*(max(-budget.lower, budget.upper) for budget in budgets))
+    length = math.hypot(*(budget.asymptotic_error for budget in budgets))
     return replace(most, cause=cause, asymptotic_error=length, lower=nearest, upper=farthest)
 
 
 def _attributed(
-    h: Array, e: Array, found: Posterior, floor: float, noise: float, judged_together: int
+    h: Array, e: Array, posterior: Posterior, floor: float, noise: float, judged_together: int
 ) -> tuple[Cause, tuple[float, float, float]]:
     """The cause that the posterior of the asymptotic error implies, with the median and the interval; errors coarsest first."""
     coarsest, finest = float(np.min(np.abs(e[[0, start_of_finest(h)]]))), abs(float(e[-1]))
     large = max(LARGEST_SHARE_OF_COARSEST * coarsest, floor)
     allowed = min(max(finest, SHARE_OF_COARSEST * coarsest, floor), large)
-    above, below = found.beyond(floor)
-    median, lower, upper = found.interval(judged_together)
-    if not found.has_sign:  # one part that is smaller than another does not show
+    above, below = posterior.beyond(floor)
+    median, lower, upper = posterior.interval(judged_together)
+    if not posterior.has_sign:  # one part that is smaller than another does not show
         upper = max(upper, finest)
     if max(above, below) > 1.0 - MODEL_RISK / judged_together:
-        lower, upper = (lower, min(upper, -floor)) if found.has_sign and below > above else (max(lower, floor), upper)
+        lower, upper = (lower, min(upper, -floor)) if posterior.has_sign and below > above else (max(lower, floor), upper)
         return "model", (median, lower, upper)
     lower, upper = min(lower, 0.0), max(upper, 0.0)
     risks = ((allowed, DISCRETISATION_RISK), (0.5 * allowed, LARGER_THAN_HALF), (large, LARGE_RISK))
-    is_small = all(sum(found.beyond(reach)) < risk for reach, risk in risks)
+    is_small = all(sum(posterior.beyond(reach)) < risk for reach, risk in risks)
     if not is_small or allowed < noise:
         return "unresolved", (median, lower, upper)
-    if not found.has_sign:
+    if not posterior.has_sign:
         return "discretisation", (median, lower, upper)
-    reach = 0.5 * allowed if sum(found.beyond(0.5 * allowed)) < 1.0 - CREDIBLE else allowed
+    reach = 0.5 * allowed if sum(posterior.beyond(0.5 * allowed)) < 1.0 - CREDIBLE else allowed
     return "discretisation", (min(max(median, -reach), reach), max(lower, -reach), min(upper, reach))
 
 

@@ -146,8 +146,8 @@ class Posterior:
     def _below(self, x: Array) -> Array:
         """The probability that m is not 0 and at most x, at each x."""
         points = np.where(self.squares, np.abs(x[:, None]) * x[:, None], x[:, None])
-        found: Array = student_t(self.freedom, (points - self.centres) / self.widths) @ self.weights
-        return found
+        share: Array = student_t(self.freedom, (points - self.centres) / self.widths) @ self.weights
+        return share
 
 
 def extrapolate(
@@ -274,10 +274,10 @@ def _posterior(parts: list[_Fit], forms: _Forms, freedom: int) -> Posterior:
     """All forms combined; the parts are the fits of e and, for a metric without a sign, of e²."""
     top = max(float(np.max(part.log_weights)) for part in parts)
     weights = [np.exp(part.log_weights - top) for part in parts]
-    zero, total = sum(float(one[:, 0].sum()) for one in weights), sum(float(one.sum()) for one in weights)
+    zero, total = sum(float(array[:, 0].sum()) for array in weights), sum(float(array.sum()) for array in weights)
     columns = (weights, [part.centres for part in parts], [part.widths for part in parts])
-    weight, centre, width = (np.concatenate([one[:, 1:].ravel() for one in column]) for column in columns)
-    is_square = np.repeat(np.arange(len(parts)) == 1, [one[:, 1:].size for one in weights])
+    weight, centre, width = (np.concatenate([array[:, 1:].ravel() for array in column]) for column in columns)
+    is_square = np.repeat(np.arange(len(parts)) == 1, [array[:, 1:].size for array in weights])
     likeliest = np.argsort(weight)[::-1]
     kept = likeliest[: 1 + np.searchsorted(np.cumsum(weight[likeliest]), (1.0 - NEGLIGIBLE_WEIGHT) * weight.sum())]
     share = (1.0 - zero / total) / weight[kept].sum()

@@ -25,7 +25,7 @@ from dropspin.scenarios.validation import key_of
 
 
 def judge(
-    scene: Scenario, truth: Truth | None, claim: Claim, metric: Metric, point: SeriesPoint, found: Convergence | None = None
+    scene: Scenario, truth: Truth | None, claim: Claim, metric: Metric, point: SeriesPoint, convergence: Convergence | None = None
 ) -> Judgement:
     """Judge the value of a metric at a time step.
 
@@ -48,7 +48,7 @@ def judge(
         claim: The properties that the engine declares, and the limitations that it met at this time step.
         metric: The metric.
         point: The metric at this time step.
-        found: The convergence of the metric; None if it was not measured at several time steps.
+        convergence: The convergence of the metric; None if it was not measured at several time steps.
     """
     value, unresolved = point.average.value, point.unresolved
     expected = compared_with_expectations(scene, claim.label, point.dt, metric, value)
@@ -72,21 +72,21 @@ def judge(
     if verdict == "failed" and np.fmax(lower - value, value - upper) <= point.rounded:
         verdict = "limited"
         reason += f"; rounding in the single precision that the engine declares may cause {point.rounded:.2g}"
-    if verdict == "passed" and (lower > 0.0 or upper < 0.0) and found is not None:
-        asymptotic = judge_asymptotic_error(scene, claim, metric, found)
+    if verdict == "passed" and (lower > 0.0 or upper < 0.0) and convergence is not None:
+        asymptotic = judge_asymptotic_error(scene, claim, metric, convergence)
         verdict = "known" if asymptotic is not None and asymptotic.verdict == "known" else verdict
-    cause = "unresolved" if unresolved else "" if found is None else found.budget.cause
+    cause = "unresolved" if unresolved else "" if convergence is None else convergence.budget.cause
     return Judgement(value, verdict, lower, upper, cause, reason, point.tolerance, basis)
 
 
-def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, found: Convergence) -> Judgement | None:
+def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, convergence: Convergence) -> Judgement | None:
     """Judge an asymptotic error; None if the time steps give none. The difference from a recording that remains is `measured`.
 
     A model error or a setting error is `known` if an expectation for this engine at its finest time step allows values of its interval,
     `limited` if a known limitation explains an error as small as the nearer end of the interval, and fails otherwise. An unresolved one is
     `measured`. A vanishing error passes, also where a known fault is expected at a time step: whether that fault occurs is judged there.
     """
-    budget = found.budget
+    budget = convergence.budget
     if math.isnan(budget.asymptotic_error):
         return None
     verdict: Verdict = "measured" if budget.cause == "unresolved" else "passed"
@@ -94,15 +94,15 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, found:
     if budget.cause in (WITHIN_UNCERTAINTY, COMBINED):
         verdict = "measured"
     elif budget.cause in ("model", "setting"):
-        of_engine = [one for one in _matching(scene, claim.label, found.finest, metric) if one.engine is not None]
-        allowing = _narrowest(of_engine)
-        bounds = [_bounds(one, metric) for one in allowing]
+        matching = _matching(scene, claim.label, convergence.finest, metric)
+        allowing = _narrowest([expectation for expectation in matching if expectation.engine is not None])
+        bounds = [_bounds(expectation, metric) for expectation in allowing]
         if bounds and all(budget.lower <= upper and budget.upper >= lower for lower, upper in bounds):
-            verdict, reason = "known", "; ".join(one.reason for one in allowing)
+            verdict, reason = "known", "; ".join(expectation.reason for expectation in allowing)
         else:
             explained = _explained(claim, metric, max(budget.lower, -budget.upper))
             verdict, reason = "limited" if explained else "failed", joined(*explained, f"{reason}; no time step removes it")
-    reason += f" ({found.remark})" if found.remark else ""
+    reason += f" ({convergence.remark})" if convergence.remark else ""
     if verdict == "failed" and budget.cause == "setting":
         reason += ", but the calibrated profile has none or a smaller one: it is a setting"
     # The result of time steps that leave the cause open is not compared with that of another run.
@@ -110,9 +110,9 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, found:
     return Judgement(budget.asymptotic_error, verdict, budget.lower, budget.upper, budget.cause, reason, tolerance)
 
 
-def judge_order(claim: Claim, metric: Metric, found: Convergence) -> Judgement | None:
+def judge_order(claim: Claim, metric: Metric, convergence: Convergence) -> Judgement | None:
     """Judge an observed order: it fails if its interval does not reach the claimed order; None if the errors follow no power of dt."""
-    budget = found.budget
+    budget = convergence.budget
     claimed = claim.order if budget.cause == "discretisation" else None
     if metric.name in JUMPING or (math.isnan(budget.order) and claimed != math.inf):
         return None
@@ -120,7 +120,7 @@ def judge_order(claim: Claim, metric: Metric, found: Convergence) -> Judgement |
     steps = ", ".join(f"{dt:g}" for dt in budget.dts)
     claim_text = "" if claimed is None else f"; claimed {'exactness' if claimed == math.inf else f'{claimed:g}'}"
     reason = f"fitted at {steps} s{claim_text}" if steps else f"{budget.reason}{claim_text}"
-    return Judgement(budget.order, verdict, budget.order_lower, budget.order_upper, budget.cause, reason, found.order_tolerance)
+    return Judgement(budget.order, verdict, budget.order_lower, budget.order_upper, budget.cause, reason, convergence.order_tolerance)
 
 
 def remark_on_horizon(scene: Scenario, truth: Truth | None, metric: Metric) -> str:
@@ -135,7 +135,7 @@ def remark_on_horizon(scene: Scenario, truth: Truth | None, metric: Metric) -> s
 
 def _explained(claim: Claim, metric: Metric, size: float) -> list[str]:
     """The known limitations that an engine met and that explain an error of some size."""
-    return [one.message for one in claim.limitations if size <= one.explained_errors.get(metric.name, -1.0)]
+    return [limitation.message for limitation in claim.limitations if size <= limitation.explained_errors.get(metric.name, -1.0)]
 
 
 def joined(*reasons: str) -> str:
@@ -153,9 +153,9 @@ def compared_with_expectations(scene: Scenario, label: str, dt: float, metric: M
     matching = _matching(scene, label, dt, metric)
     if not matching:
         return Judgement(value, "measured")
-    binding, of_all = _narrowest(matching), [one for one in matching if one.engine is None]
+    binding, of_all = _narrowest(matching), [expectation for expectation in matching if expectation.engine is None]
     lower, upper = _strictest(binding, metric)
-    reason, is_met = "; ".join(one.reason for one in binding), lower <= value <= upper
+    reason, is_met = "; ".join(expectation.reason for expectation in binding), lower <= value <= upper
     verdict: Verdict = "passed" if is_met else "failed"
     basis: Basis = ""
     if binding[0].engine is not None and _expect_fault(scene, binding, metric):
@@ -175,30 +175,30 @@ def compared_with_expectations(scene: Scenario, label: str, dt: float, metric: M
 def _matching(scene: Scenario, label: str, dt: float, metric: Metric) -> list[Expectation]:
     """The expectations of a metric that apply to an engine at a time step [s]."""
     return [
-        one
-        for one in scene.expect
-        if one.metric == metric.name
-        and one.engine in (None, label)
-        and (one.dt is None or any(math.isclose(step, dt, rel_tol=1e-9) for step in one.dt))
+        expectation
+        for expectation in scene.expect
+        if expectation.metric == metric.name
+        and expectation.engine in (None, label)
+        and (expectation.dt is None or any(math.isclose(step, dt, rel_tol=1e-9) for step in expectation.dt))
     ]
 
 
 def _narrowest(expectations: Sequence[Expectation]) -> list[Expectation]:
     """The most specific expectations: for an engine at a time step, else for an engine, else for a time step, else for all."""
-    narrowness = [2 * (one.engine is not None) + (one.dt is not None) for one in expectations]
-    return [one for one, narrow in zip(expectations, narrowness, strict=True) if narrow == max(narrowness)]
+    narrowness = [2 * (expectation.engine is not None) + (expectation.dt is not None) for expectation in expectations]
+    return [expectation for expectation, narrow in zip(expectations, narrowness, strict=True) if narrow == max(narrowness)]
 
 
 def _strictest(expectations: Sequence[Expectation], metric: Metric) -> tuple[float, float]:
     """The bounds of expectations that must all be met."""
-    lowers, uppers = zip(*(_bounds(one, metric) for one in expectations), strict=True)
+    lowers, uppers = zip(*(_bounds(expectation, metric) for expectation in expectations), strict=True)
     return max(lowers), min(uppers)
 
 
 def _expect_fault(scene: Scenario, named: Sequence[Expectation], metric: Metric) -> bool:
     """Whether expectations for one engine allow more than those for all engines, or exclude an error of 0."""
-    of_all = [_bounds(one, metric) for one in scene.expect if one.metric == metric.name and one.engine is None]
-    bounds = [_bounds(one, metric) for one in named]
+    of_all = [_bounds(expected, metric) for expected in scene.expect if expected.metric == metric.name and expected.engine is None]
+    bounds = [_bounds(expected, metric) for expected in named]
     if of_all:
         return all(low < min(least for least, _ in of_all) or high > max(most for _, most in of_all) for low, high in bounds)
     return any(low > 0.0 or high < 0.0 for low, high in bounds)

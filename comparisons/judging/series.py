@@ -41,9 +41,9 @@ def verified(dts: ArrayLike, errors: ArrayLike, resolution: ArrayLike, rounding:
     return h, e, _spread("resolution", resolution, e), _spread("rounding", rounding, e)
 
 
-def _spread(name: str, given: ArrayLike, errors: Array) -> Array:
+def _spread(name: str, numbers: ArrayLike, errors: Array) -> Array:
     """Numbers that are finite and not negative, one for each error, from these or from one for all."""
-    values = _numbers(name, given)
+    values = _numbers(name, numbers)
     if values.shape not in ((), (1,), errors.shape):
         raise DropspinError(f"{name} takes one number, or one for each of {len(errors)} time steps; got the shape {values.shape}.")
     values = np.broadcast_to(values, errors.shape)

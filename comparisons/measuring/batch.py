@@ -46,12 +46,12 @@ def motions_side_by_side(
     shape = states.shape[:2]
     height, kinetic, energy, lowest = (np.empty(shape) for _ in range(4))
     touching, valid = np.zeros((shape[0], shape[1] - 1), dtype=bool), np.ones(shape[0], dtype=bool)
-    found = StatesOfMany(height, states[..., 8], kinetic, energy, lowest, touching)
+    quantities = StatesOfMany(height, states[..., 8], kinetic, energy, lowest, touching)
     shared = (setup.mass, setup.inertia, setup.vertices, setup.semi_axes, setup.size, setup.origin, setup.gravity, setup.gravity_strength)
-    given = tuple(_for_each(values, shape[0]) for values in (*shared, setup.damping_share(dt), dt, velocity_lag))
+    inputs = tuple(_for_each(values, shape[0]) for values in (*shared, setup.damping_share(dt), dt, velocity_lag))
     rows, last = np.ascontiguousarray(states), np.ascontiguousarray(last_row, dtype=np.int64)
-    _kernel()((height, kinetic, energy, lowest, touching, valid), rows, unit_tolerance, last, given)
-    return Motions(setup, found, dt, last_row), valid
+    _kernel()((height, kinetic, energy, lowest, touching, valid), rows, unit_tolerance, last, inputs)
+    return Motions(setup, quantities, dt, last_row), valid
 
 
 def compute_cases(cases: Sequence[Comparison]) -> None:
@@ -59,8 +59,8 @@ def compute_cases(cases: Sequence[Comparison]) -> None:
     scene, starts = cases[0].scene, Setup.of_starts([case.scene for case in cases])
     setup, has_residuals = Setup.of(scene), obeys_contact_laws(scene, None)
     for case, origin, clearance in zip(cases, starts.origin, starts.clearance, strict=True):
-        own, last_row = replace(setup, origin=origin, clearance=np.asarray(clearance)), np.asarray(len(case.motion) - 1)
-        vars(case)["motions"] = Motions(own, States(case.scene, case.motion), np.asarray(case.dt), last_row)
+        started, last_row = replace(setup, origin=origin, clearance=np.asarray(clearance)), np.asarray(len(case.motion) - 1)
+        vars(case)["motions"] = Motions(started, States(case.scene, case.motion), np.asarray(case.dt), last_row)
     for numbers, states, together in compute_states([case.states for case in cases]):
         residuals = contact_residuals(scene, states, together) if has_residuals else None
         for number, case in enumerate(cases[numbers]):
@@ -69,26 +69,26 @@ def compute_cases(cases: Sequence[Comparison]) -> None:
                 vars(case)["contacts"] = residuals.of_motion(number)
 
 
-def compute_states(found: Sequence[States]) -> Iterator[tuple[slice, Array, Motions]]:
+def compute_states(all_states: Sequence[States]) -> Iterator[tuple[slice, Array, Motions]]:
     """Compute the quantities at each state of motions from several starts of one scene, of those of equal length at once.
 
     Yields:
         For each batch of motions whose states are finite: which of the motions they are, their states, shape (B, n, 13), and the motions.
     """
-    lengths = [len(one.motion) for one in found]
-    edges = [0, *(number for number in range(1, len(found)) if lengths[number] != lengths[number - 1]), len(found)]
+    lengths = [len(member.motion) for member in all_states]
+    edges = [0, *(number for number in range(1, len(all_states)) if lengths[number] != lengths[number - 1]), len(all_states)]
     batches = [(start, end, max(1, BATCH_BYTES // (max(lengths[start], 1) * 13 * 8))) for start, end in pairwise(edges)]
     for numbers in (slice(first, min(first + many, end)) for start, end, many in batches for first in range(start, end, many)):
-        some, rows = found[numbers], lengths[numbers.start]
+        batch, rows = all_states[numbers], lengths[numbers.start]
         if rows < 2:
             continue
-        setup = Setup.of_starts([one.scene for one in some])
-        states, lag = np.stack([one.motion.states for one in some]), np.array([one.motion.velocity_lag for one in some])
-        dt, last_row = np.full(len(some), some[0].motion.t[1] - some[0].motion.t[0]), np.full(len(some), rows - 1)
+        setup = Setup.of_starts([member.scene for member in batch])
+        states, lag = np.stack([member.motion.states for member in batch]), np.array([member.motion.velocity_lag for member in batch])
+        dt, last_row = np.full(len(batch), batch[0].motion.t[1] - batch[0].motion.t[0]), np.full(len(batch), rows - 1)
         together, valid = motions_side_by_side(setup, states, dt, lag, last_row, np.inf)
         if valid.all():
-            for number, one in enumerate(some):
-                vars(one).update({name: getattr(together.states, name)[number] for name in AT_ONCE})
+            for number, member in enumerate(batch):
+                vars(member).update({name: getattr(together.states, name)[number] for name in AT_ONCE})
             yield numbers, states, together
 
 
@@ -113,9 +113,9 @@ def _kernel() -> Callable[..., None]:
     return compile_cached(_fill, *(Path(module) for module in (__file__, mechanics.__file__, states_module.__file__)))
 
 
-def _fill(found: Any, states: Any, unit_tolerance: float, last_row: Any, given: Any) -> None:
-    height, kinetic, energy, lowest, touching, valid = found
-    mass, inertia, vertices, semi_axes, size, origin, gravity, strength, damping_share, dt, lag = given
+def _fill(outputs: Any, states: Any, unit_tolerance: float, last_row: Any, inputs: Any) -> None:
+    height, kinetic, energy, lowest, touching, valid = outputs
+    mass, inertia, vertices, semi_axes, size, origin, gravity, strength, damping_share, dt, lag = inputs
     for body in range(states.shape[0]):
         i, o, g, last = inertia[body], (origin[body, 0], origin[body, 1], origin[body, 2]), gravity[body], last_row[body]
         tensor = ((i[0, 0], i[0, 1], i[0, 2]), (i[1, 0], i[1, 1], i[1, 2]), (i[2, 0], i[2, 1], i[2, 2]))

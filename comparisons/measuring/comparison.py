@@ -48,9 +48,9 @@ def at_times(motion: Trajectory, times: Array) -> Trajectory:
     steps = times / (motion.t[1] - motion.t[0])
     before = np.minimum(steps.astype(np.intp), len(motion) - 2)
     share, states = (steps - before)[:, np.newaxis], motion.states
-    found = (1.0 - share) * states[before] + share * states[before + 1]
-    found[:, ORIENTATION] /= length(found[:, ORIENTATION])[:, np.newaxis]
-    return Trajectory.from_states(times, found, motion.velocity_lag)
+    mixed = (1.0 - share) * states[before] + share * states[before + 1]
+    mixed[:, ORIENTATION] /= length(mixed[:, ORIENTATION])[:, np.newaxis]
+    return Trajectory.from_states(times, mixed, motion.velocity_lag)
 
 
 def exactly(truth: Truth, times: Array) -> Trajectory:
@@ -90,11 +90,11 @@ class Comparison:
         return cls(scene, motion, exactly(truth, motion.t) if exact is None else exact, tuple(event.time for event in truth.events))
 
     @classmethod
-    def between(cls, one: "Comparison", other: "Comparison", until: int) -> "Comparison":
+    def between(cls, first: "Comparison", second: "Comparison", until: int) -> "Comparison":
         """Compare the motions of two engines over `until` rows; what was already computed of them is reused."""
-        case = cls(one.scene, one.motion, other.motion[:until], one.impacts)
-        vars(case)["motions"] = one.motions
-        vars(case.exact_states).update({name: vars(other.states)[name][:until] for name in OF_EACH_STATE if name in vars(other.states)})
+        case = cls(first.scene, first.motion, second.motion[:until], first.impacts)
+        vars(case)["motions"] = first.motions
+        vars(case.exact_states).update({name: vars(second.states)[name][:until] for name in OF_EACH_STATE if name in vars(second.states)})
         return case
 
     @cached_property

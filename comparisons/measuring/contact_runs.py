@@ -75,8 +75,8 @@ def contact_runs(touching: Mask, vertical_velocity: Array, on_floor: Mask, fall:
     motion, before, after = begins[begun] // width, begins[begun] % width - 1, ends[begun] % width
     speed = vertical_velocity[motion, before]
     least = np.maximum(STOPPED * np.abs(speed), RESOLVED * fall[motion])
-    found = is_low[begun] | (vertical_velocity[motion, after] - speed > least)
-    return ContactRuns(motion[found], before[found], after[found])
+    counts = is_low[begun] | (vertical_velocity[motion, after] - speed > least)
+    return ContactRuns(motion[counts], before[counts], after[counts])
 
 
 def _padded(steps: Mask) -> Mask:

@@ -129,11 +129,11 @@ def contacts(scene: Scenario, motion: Trajectory) -> "pd.DataFrame":
             f"{scene.name}: the forces of the floor need a scene with a floor that does not end, without walls and without damping."
         )
     motions = Motions.of(scene, motion)
-    found = contact_residuals(scene, motion.states, motions)
+    per_step = contact_residuals(scene, motion.states, motions)
     starts, ends = motions.contacts.before, motions.contacts.after
     first = np.cumsum(ends - starts) - (ends - starts)  # the number of the first step of each contact among those in contact
     falling = (motion.t[ends] - motion.t[starts]) * scene.acceleration[1]
-    largest = {name: getattr(found, name)[found.in_contact] for name in RESIDUALS}
+    largest = {name: getattr(per_step, name)[per_step.in_contact] for name in RESIDUALS}
     residuals = {name: np.maximum.reduceat(values, first) if len(first) else values for name, values in largest.items()}
     return pd.DataFrame(
         {

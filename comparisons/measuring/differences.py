@@ -22,12 +22,12 @@ def differences(scene: Scenario, first: Array, second: Array) -> Array:
     """
     size, g = scene.body.size, float(np.linalg.norm(scene.acceleration))
     finite = np.isfinite(first).all(axis=1) & np.isfinite(second).all(axis=1)
-    found, first, second = np.full(len(first), math.inf), first[finite], second[finite]
+    largest, first, second = np.full(len(first), math.inf), first[finite], second[finite]
     if not finite.any():
-        return found
+        return largest
     # Relative to the speeds that the body or gravity gives: a speed of rounding errors is not a scale.
     speed = max(float(np.abs(first[:, VELOCITY]).max()), size * float(np.abs(first[:, SPIN]).max()), math.sqrt(g * size))
     scales = ((POSITION, size), (VELOCITY, speed), (SPIN, speed / size))
     ratios = [np.abs(first[:, part] - second[:, part]).max(axis=1) / scale for part, scale in scales if scale > 0.0]
-    found[finite] = np.max([angle_between_orientations(first[:, ORIENTATION], second[:, ORIENTATION]), *ratios], axis=0)
-    return found
+    largest[finite] = np.max([angle_between_orientations(first[:, ORIENTATION], second[:, ORIENTATION]), *ratios], axis=0)
+    return largest

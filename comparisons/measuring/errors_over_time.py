@@ -12,8 +12,8 @@ ALL = slice(None)
 
 def energy_error(case: Comparison, synchronised: bool = True) -> Array:
     """Difference of energy from that of the exact solution, over the scene's energy."""
-    found = case.states.energy if synchronised else case.states.energy_as_stored
-    return (found[: len(case.exact)] - case.exact_states.energy) / case.energy_scale
+    energy = case.states.energy if synchronised else case.states.energy_as_stored
+    return (energy[: len(case.exact)] - case.exact_states.energy) / case.energy_scale
 
 
 def angular_momentum_error(case: Comparison) -> Array:
@@ -23,10 +23,10 @@ def angular_momentum_error(case: Comparison) -> Array:
 
 def angular_momentum_difference(case: Comparison, rows: Rows = ALL) -> Array:
     """The difference as a vector in the world frame, over the largest exact value, shape (n, 3)."""
-    found, exact, scale = case.angular_momentum, case.exact_states.angular_momentum, case.exact_states.largest_angular_momentum
+    computed, exact, scale = case.angular_momentum, case.exact_states.angular_momentum, case.exact_states.largest_angular_momentum
     if scale == 0.0:
         raise Unresolved("the angular momentum is 0 in double precision")
-    difference: Array = (found[rows] - exact[rows]) / scale
+    difference: Array = (computed[rows] - exact[rows]) / scale
     return difference
 
 

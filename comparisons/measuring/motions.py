@@ -161,10 +161,10 @@ class Motions:
     @cached_property
     def in_contact(self) -> Mask:
         """For each step, whether it is in a contact, shape (..., n - 1)."""
-        found = np.zeros(np.atleast_2d(self.states.touching).shape, dtype=bool)
+        mask = np.zeros(np.atleast_2d(self.states.touching).shape, dtype=bool)
         motion, step, _ = self.contacts.steps
-        found[motion, step] = True
-        return found.reshape(self.states.touching.shape)
+        mask[motion, step] = True
+        return mask.reshape(self.states.touching.shape)
 
     @cached_property
     def energy_gained(self) -> Array:
@@ -184,7 +184,7 @@ class Motions:
         runs = self.contacts
         motion, step, number = runs.steps
         energy, lowest, velocity = map(np.atleast_2d, (self.states.energy, self.states.lowest_height, self.states.vertical_velocity))
-        fall, dt, mass = (np.broadcast_to(one, len(energy))[motion] for one in (self.fall, self.dt, self.setup.mass))
+        fall, dt, mass = (np.broadcast_to(value, len(energy))[motion] for value in (self.fall, self.dt, self.setup.mass))
         rise, sinking = velocity[motion, step + 1] - velocity[motion, step], lowest[motion, step] - lowest[motion, step + 1]
         compressed = (rise > STEADY * fall) & (sinking > RESOLVED * fall * dt)
         again = compressed[1:] & compressed[:-1] & (number[1:] == number[:-1])
@@ -193,16 +193,16 @@ class Motions:
         before = runs.before[number]
         level = np.maximum(lowest[motion, np.maximum(before - 1, 0)], 0.0)
         force = np.where(is_soft[number], mass * np.maximum(rise + fall, 0.0) / dt, 0.0)
-        found = energy.copy()
+        total = energy.copy()
         for row in (step, step + 1):
             lost = energy[motion, before] - energy[motion, row]
             stored = np.minimum(force * np.maximum(level - lowest[motion, row], 0.0), lost)
-            found[motion, row] = np.maximum(found[motion, row], energy[motion, row] + stored)
-        found = found.reshape(self.states.energy.shape)
+            total[motion, row] = np.maximum(total[motion, row], energy[motion, row] + stored)
+        total = total.reshape(self.states.energy.shape)
         if self.setup.walls:
             assert isinstance(self.states, States)
-            found[self.states.near_wall] = np.inf
-        return found
+            total[self.states.near_wall] = np.inf
+        return total
 
     @cached_property
     def first_contact(self) -> tuple[RowNumbers, RowNumbers]:

@@ -105,7 +105,7 @@ def gains_no_energy(scene: Scenario, truth: Truth | None) -> bool:
     """
     if scene.damping is not None or _floor_ends(scene):
         return False
-    return truth is None or all(_kinetic(scene, one.after) <= (1.0 + 1e-9) * _kinetic(scene, one.before) for one in truth.events)
+    return truth is None or all(_kinetic(scene, event.after) <= (1.0 + 1e-9) * _kinetic(scene, event.before) for event in truth.events)
 
 
 def _kinetic(scene: Scenario, state: Array) -> float:

@@ -89,10 +89,10 @@ class States:
         """Whether the body may touch a wall within a step before or after a row, shape (n,)."""
         dt, size = self.motion.t[1] - self.motion.t[0], self.scene.body.size
         reach = TOUCHING * size + dt * (length(self.motion.velocity) + size * length(self.motion.angular_velocity))
-        found = np.zeros(len(self.motion), dtype=bool)
+        near = np.zeros(len(self.motion), dtype=bool)
         for wall in self.scene.wall or ():
-            found |= lowest_height(self.scene, Trajectory.from_states(self.motion.t, wall.as_floor(self.motion.states))) <= reach
-        return found
+            near |= lowest_height(self.scene, Trajectory.from_states(self.motion.t, wall.as_floor(self.motion.states))) <= reach
+        return near
 
     @cached_property
     def touching(self) -> Mask:
@@ -101,8 +101,8 @@ class States:
         before, after = (tuple(self.motion.velocity[rows].T) for rows in (slice(None, -1), slice(1, None)))
         strength = float(np.sqrt(scalar_product(gravity, gravity)))
         damping_share = 0.0 if damping is None else max(dt, self.scene.factor_dt) * damping.linear
-        found: Mask = is_touching(before, after, dt, gravity, strength, damping_share)
-        return found
+        mask: Mask = is_touching(before, after, dt, gravity, strength, damping_share)
+        return mask
 
 
 def is_touching(before: Components, after: Components, dt: float, gravity: Components, strength: float, damping_share: float) -> Any:

@@ -58,10 +58,10 @@ def _turned_by(name: str, angle: float) -> Symmetry:
 
 def _seen_from(name: str, distance: float, speed: float = 0.0) -> Symmetry:
     def back(t: Array, states: Array) -> Array:
-        found = states.copy()
-        found[:, POSITION] -= (distance + speed * t[:, np.newaxis]) * AWAY
-        found[:, VELOCITY] -= speed * AWAY
-        return found
+        moved = states.copy()
+        moved[:, POSITION] -= (distance + speed * t[:, np.newaxis]) * AWAY
+        moved[:, VELOCITY] -= speed * AWAY
+        return moved
 
     applies = is_sliding_free if speed else _has_no_edges
     return Symmetry(name, lambda scene: moving(scene, distance * AWAY, speed * AWAY), back, applies)
@@ -73,8 +73,8 @@ def _in(name: str, length: float = 1.0, time: float = 1.0, mass: float = 1.0) ->
 
 
 SYMMETRIES = {
-    one.name: one
-    for one in (
+    symmetry.name: symmetry
+    for symmetry in (
         _turned_by("turned by 90°", 0.5 * math.pi),
         _turned_by("turned by 1 rad", 1.0),
         Symmetry("mirrored", mirrored, lambda t, states: REFLECTED * states),

@@ -33,10 +33,10 @@ def quantity(name: str) -> Quantity:
     return lambda scene, motion: float(QUANTITIES[name](scene, motion))
 
 
-def _at(what: str, time: float) -> Quantity:
+def _at(name: str, time: float) -> Quantity:
     def value(scene: Scenario, motion: Trajectory) -> float:
         row = int(np.argmin(np.abs(motion.t - time)))
-        return float(motion.position[row, 1] if what == "height" else np.linalg.norm(motion.velocity[row]))
+        return float(motion.position[row, 1] if name == "height" else np.linalg.norm(motion.velocity[row]))
 
     return value
 
@@ -71,8 +71,8 @@ def _from_parabola(scene: Scenario, motion: Trajectory) -> Array:
 
 def _mean_square_energy_error(scene: Scenario, motion: Trajectory) -> Any:
     """The mean (ΔE)² of the states before each step, of all balls [J²]."""
-    found = BALLS * _energy(scene, motion)
-    return np.mean((found[:-1] - found[0]) ** 2)
+    total = BALLS * _energy(scene, motion)
+    return np.mean((total[:-1] - total[0]) ** 2)
 
 
 def _rebound_height(scene: Scenario, motion: Trajectory) -> float:

@@ -108,5 +108,5 @@ def sources(names: Iterable[str] = ()) -> list[Source]:
     known, names = source_names(), list(dict.fromkeys(names))
     chosen = names or known
     verify_known("source", chosen, known)
-    found = [Source.model_validate({"name": name, **read_toml(DATA / f"{name}.toml", name)}) for name in chosen]
-    return found if names else [source for source in found if not source.data]
+    loaded = [Source.model_validate({"name": name, **read_toml(DATA / f"{name}.toml", name)}) for name in chosen]
+    return loaded if names else [source for source in loaded if not source.data]

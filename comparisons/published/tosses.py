@@ -95,23 +95,23 @@ def acosta_cube(source: Source, folder: str, processes: EngineProcesses) -> Iter
     tosses = read_tosses(Path(folder), cube)
     for run in source.parameters["runs"]:
         entry = engine_entry(run["by"]) if run["by"] else EngineEntry("", None, "missing", run["why_not"])
-        found = processes.call(entry, _simulated, cube, run, tosses)
+        values = processes.call(entry, _simulated, cube, run, tosses)
         yield [
-            _result(source.name, run, quantity, printed, found if isinstance(found, Breakdown) else found[quantity])
+            _result(source.name, run, quantity, printed, values if isinstance(values, Breakdown) else values[quantity])
             for quantity, printed in run["printed"].items()
         ]
 
 
 def _result(name: str, run: Run, quantity: str, printed: str, value: float | Breakdown) -> Result:
-    what, why_not = f"{run['case']}: {quantity}", run.get("why_not", "")
+    label, why_not = f"{run['case']}: {quantity}", run.get("why_not", "")
     if isinstance(value, Breakdown):
         if why_not:
-            return Result(name, run["tool"], what, printed, "", run["by"], "not reproducible", why_not)
-        return Result(name, run["tool"], what, printed, "", run["by"], "not run", value.reason, verdict=value.verdict)
-    found = agreement(printed, value)
+            return Result(name, run["tool"], label, printed, "", run["by"], "not reproducible", why_not)
+        return Result(name, run["tool"], label, printed, "", run["by"], "not run", value.reason, verdict=value.verdict)
+    compared = agreement(printed, value)
     if why_not:
-        return Result(name, run["tool"], what, printed, f"{value:.{SHOWN}g}", run["by"], "not reproducible", why_not, found.difference)
-    return Result(name, run["tool"], what, printed, found.here, run["by"], found.status, difference=found.difference)
+        return Result(name, run["tool"], label, printed, f"{value:.{SHOWN}g}", run["by"], "not reproducible", why_not, compared.difference)
+    return Result(name, run["tool"], label, printed, compared.here, run["by"], compared.status, difference=compared.difference)
 
 
 def _simulated(entry: EngineEntry, cube: Cube, run: Run, tosses: list[Array]) -> dict[str, float]:

@@ -52,21 +52,21 @@ class ExtendedMotion(NamedTuple):
     Attributes:
         scene: The scene.
         dt: The engine's time step [s].
-        own: The motion for the scene's duration.
-        whole: The whole motion; it begins with `own`.
+        nominal: The motion for the scene's duration.
+        whole: The whole motion; it begins with `nominal`.
         truth: The scene's exact solution.
     """
 
     scene: Scenario
     dt: float
-    own: Trajectory
+    nominal: Trajectory
     whole: Trajectory
     truth: Truth | None
 
 
 def worst(diagnoses: list[Diagnosis]) -> Diagnosis:
     """The most severe of several diagnoses, and of equal modes the one with the largest size; `SOUND` if there are none."""
-    return max(diagnoses, key=lambda one: (FAILURE_MODES.index(one.mode), one.size), default=SOUND)
+    return max(diagnoses, key=lambda diagnosis: (FAILURE_MODES.index(diagnosis.mode), diagnosis.size), default=SOUND)
 
 
 def diagnose(motion: ExtendedMotion, within: float) -> Diagnosis:
@@ -76,12 +76,12 @@ def diagnose(motion: ExtendedMotion, within: float) -> Diagnosis:
         return Diagnosis("diverged", "not finite", math.inf, f"the state is not finite at t = {motion.whole.t[bad]:g} s")
     with np.errstate(all="ignore"):  # the squares of large numbers overflow
         whole = Comparison.with_truth(motion.scene, motion.whole, motion.truth)
-        exact = None if whole.reference is None else whole.reference[: len(motion.own)]
-        own = Comparison.with_truth(motion.scene, motion.own, motion.truth, exact)
-        found = [*_energy_gain(whole), *_errors(motion, own, within), *_position_off(own)]
+        exact = None if whole.reference is None else whole.reference[: len(motion.nominal)]
+        case = Comparison.with_truth(motion.scene, motion.nominal, motion.truth, exact)
+        diagnoses = [*_energy_gain(whole), *_errors(motion, case, within), *_position_off(case)]
         if motion.scene.floor is not None and not motion.scene.floor.ends:
-            found += [*_tunnels(motion), *_sinks(motion), *_never_rests(motion, whole)]
-    return worst(found)
+            diagnoses += [*_tunnels(motion), *_sinks(motion), *_never_rests(motion, whole)]
+    return worst(diagnoses)
 
 
 def _energy_gain(whole: Comparison) -> Iterator[Diagnosis]:
@@ -99,7 +99,7 @@ def _energy_gain(whole: Comparison) -> Iterator[Diagnosis]:
 
 
 def _may_gain(scene: Scenario) -> bool:
-    return not scene.body.is_ball and any(one.friction != "none" and one.restitution > 0.0 for one in scene.surfaces)
+    return not scene.body.is_ball and any(surface.friction != "none" and surface.restitution > 0.0 for surface in scene.surfaces)
 
 
 def _tunnels(motion: ExtendedMotion) -> Iterator[Diagnosis]:
@@ -126,45 +126,45 @@ def _sinks(motion: ExtendedMotion) -> Iterator[Diagnosis]:
         yield Diagnosis("sinks", "sinks", end, message)
 
 
-def _errors(motion: ExtendedMotion, own: Comparison, within: float) -> Iterator[Diagnosis]:
-    known = ERRORS if own.dt < 1.5 * motion.dt else ERRORS_OF_FEW_ROWS
+def _errors(motion: ExtendedMotion, case: Comparison, within: float) -> Iterator[Diagnosis]:
+    known = ERRORS if case.dt < 1.5 * motion.dt else ERRORS_OF_FEW_ROWS
     for metric in metrics_for(motion.scene, motion.truth):
         if metric.name not in known:
             continue
         try:
-            size = abs(metric.average([own]).value)
+            size = abs(metric.average([case]).value)
         except Unresolved:
             continue
         if metric.name == "restitution_error" and math.isnan(size):
             continue  # undefined for an exact motion at the coarsest steps too; a body without an impact has other errors
-        allowed = within + (_between_rows(own) if metric.name == "restitution_error" else 0.0)
+        allowed = within + (_between_rows(case) if metric.name == "restitution_error" else 0.0)
         if size <= allowed:
             yield Diagnosis("sound", metric.name, size, "")
         else:
             unit = "" if metric.unit == "1" else f" {metric.unit}"
             name = metric.name.replace("_", " ")
             value = f"{name} is {size:.4g}{unit} (tolerance {allowed:.4g})"
-            why = ": no impact was detected" if own.first_contact is None else ""
+            why = ": no impact was detected" if case.first_contact is None else ""
             message = value if math.isfinite(size) else f"{name} is undefined{why}"
             yield Diagnosis("inaccurate", metric.name, size if math.isfinite(size) else math.inf, message)
 
 
-def _between_rows(own: Comparison) -> float:
+def _between_rows(case: Comparison) -> float:
     """The error of restitution of an exact motion, whose velocities are recorded up to a step before and after an impact: g dt/u."""
-    if own.first_contact is None:
+    if case.first_contact is None:
         return 0.0
-    before, _ = own.first_contact
-    return float(own.motions.fall) / abs(own.normal_velocity_of_contact(before, contact_row=before))
+    before, _ = case.first_contact
+    return float(case.motions.fall) / abs(case.normal_velocity_of_contact(before, contact_row=before))
 
 
-def _position_off(own: Comparison) -> Iterator[Diagnosis]:
+def _position_off(case: Comparison) -> Iterator[Diagnosis]:
     """Far from the exact position, even where the metrics cannot resolve the motion."""
-    if own.reference is None:
+    if case.reference is None:
         return
-    exact = own.reference.position
-    distance, size = float(length(exact - exact[0]).max()), own.scene.body.size
+    exact = case.reference.position
+    distance, size = float(length(exact - exact[0]).max()), case.scene.body.size
     distance, of = (distance, "distance covered") if distance > DEEPER * size else (size, "size of the body")
-    error = float(length(own.motion.position[: len(exact)] - exact).max()) / distance
+    error = float(length(case.motion.position[: len(exact)] - exact).max()) / distance
     if not error <= POSITION_OFF:
         yield Diagnosis("inaccurate", "position", error, f"the position error is {error:.3g} of the {of} (limit {POSITION_OFF:g})")
 
@@ -188,14 +188,14 @@ def held_speeds(motion: Trajectory) -> dict[str, float]:
     Such a speed is reduced after the first step, or is suddenly constant to the last digit. Both may have other causes, unless another
     initial state gives the same value.
     """
-    found: dict[str, float] = {}
+    held: dict[str, float] = {}
     for name in ("velocity", "angular_velocity"):
         components = np.abs(getattr(motion, name))
         for sizes in (*components.T, length(components)):
             largest = float(sizes[1:].max())
             if largest > 0.0 and _is_held(sizes, largest):
-                found[name] = max(largest, found.get(name, 0.0))
-    return found
+                held[name] = max(largest, held.get(name, 0.0))
+    return held
 
 
 def _is_held(sizes: Array, largest: float) -> bool:

@@ -66,20 +66,20 @@ class Runner:
         if axis.name == "duration":
             return self._along_duration(axis)
         if axis.invariant:
-            unscaled, own = self._diagnosis(self.nominal), self._record([self.nominal.scene], self.nominal.dt, extend=False)
+            unscaled, motions = self._diagnosis(self.nominal), self._record([self.nominal.scene], self.nominal.dt, extend=False)
 
         def diagnose_at(value: float) -> Diagnosis:
             try:
                 moved = axis.at(self.nominal, value)
             except DropspinError as error:
                 return _without_motion(Breakdown("declined", str(error)))
-            found = self._diagnosis(moved)
-            if not axis.invariant or found.mode != unscaled.mode or found.mode in BROKEN:
-                return found
+            diagnosis = self._diagnosis(moved)
+            if not axis.invariant or diagnosis.mode != unscaled.mode or diagnosis.mode in BROKEN:
+                return diagnosis
             other = self._record([moved.scene], moved.dt, extend=False)
-            if isinstance(own, Breakdown) or isinstance(other, Breakdown):
+            if isinstance(motions, Breakdown) or isinstance(other, Breakdown):
                 return unscaled
-            return self._dependence(axis, value, own[0], moved.scene, other[0])
+            return self._dependence(axis, value, motions[0], moved.scene, other[0])
 
         return diagnose_at
 
@@ -93,11 +93,11 @@ class Runner:
             longer = [length for length in runs if length >= duration]
             if not longer:
                 runs[duration] = self._record([scene], dt, extend=False)
-            found = runs[min(longer, default=duration)]
-            if isinstance(found, Breakdown):
-                return _without_motion(found)
-            interval = float(found[0].t[1] - found[0].t[0])
-            beginning = found[0][: 1 + math.floor(duration / interval + 1e-9)]
+            motions = runs[min(longer, default=duration)]
+            if isinstance(motions, Breakdown):
+                return _without_motion(motions)
+            interval = float(motions[0].t[1] - motions[0].t[0])
+            beginning = motions[0][: 1 + math.floor(duration / interval + 1e-9)]
             return worst([nominal, self._of_motions([ExtendedMotion(scene, dt, beginning, beginning, truth_for(scene))])])
 
         return diagnose_at
@@ -112,7 +112,7 @@ class Runner:
         if isinstance(motions, Breakdown):
             return _without_motion(motions)
         both = zip(scenes, motions, strict=True)
-        return self._of_motions([ExtendedMotion(own, dt, whole[: 1 + own.steps(dt)], whole, truth_for(own)) for own, whole in both])
+        return self._of_motions([ExtendedMotion(start, dt, whole[: 1 + start.steps(dt)], whole, truth_for(start)) for start, whole in both])
 
     def _record(self, scenes: Sequence[Scenario], dt: float, extend: bool = True) -> list[Trajectory] | Breakdown:
         """The engine's motions of scenes, or the reason why there are none."""
@@ -134,15 +134,15 @@ class Runner:
         motions = self._record([other], motion.dt)
         return [] if isinstance(motions, Breakdown) else clamped(motion.whole, motions[0])
 
-    def _dependence(self, axis: Axis, value: float, own: Trajectory, moved: Scenario, other: Trajectory) -> Diagnosis:
+    def _dependence(self, axis: Axis, value: float, nominal: Trajectory, moved: Scenario, other: Trajectory) -> Diagnosis:
         """Whether the motion of a scaled scene equals the nominal one in its units, up to the end of the exact solution."""
         scene = self.nominal.scene
-        found = in_nominal_units(other.states, axis.name, axis.base(self.nominal), value)
-        rows = min(len(own), len(found))
-        for truth, times in ((truth_for(scene), own.t[:rows]), (truth_for(moved), other.t[:rows])):
+        scaled = in_nominal_units(other.states, axis.name, axis.base(self.nominal), value)
+        rows = min(len(nominal), len(scaled))
+        for truth, times in ((truth_for(scene), nominal.t[:rows]), (truth_for(moved), other.t[:rows])):
             if truth is not None:
                 rows = min(rows, int(np.count_nonzero(truth.covers(times))))
-        difference = float(differences(scene, own.states[:rows], found[:rows]).max())
+        difference = float(differences(scene, nominal.states[:rows], scaled[:rows]).max())
         if difference <= SAME_MOTION:
             return SOUND
         message = f"the motion differs from the one at the nominal {axis.name} by {difference:.1e} of its sizes and speeds"
@@ -154,13 +154,13 @@ def _recorded(entry: EngineEntry, scenes: Sequence[Scenario], dt: float, extend:
 
     Of more than `MOST_ROWS` steps, only evenly spaced states are recorded.
     """
-    found = []
+    motions = []
     for scene in scenes:
         verify_accepted(entry.adapter, scene)
         steps = scene.steps(dt)
         extra = max(0, FEWEST_STEPS_WITHOUT_GRAVITY - steps) if extend and scene.gravity is None else 0
-        found.append(record(entry.adapter, scene, dt, max(1, -(-steps // MOST_ROWS)), extra_steps=extra).motion)
-    return found
+        motions.append(record(entry.adapter, scene, dt, max(1, -(-steps // MOST_ROWS)), extra_steps=extra).motion)
+    return motions
 
 
 def _without_motion(breakdown: Breakdown) -> Diagnosis:

@@ -115,7 +115,7 @@ class RobustnessStudy:
 
     def steps(self, engine: str) -> tuple[ScanPoint, ...]:
         """The diagnoses of an engine at each time step tried, in the order of the time steps."""
-        scanned = (one.points for one in self.scans if one.axis.name == "step" and one.engine == engine)
+        scanned = (scan.points for scan in self.scans if scan.axis.name == "step" and scan.engine == engine)
         return next(scanned, tuple(reversed(self.refinements.get(engine, ()))))
 
     def largest_steps(self, engine: str) -> tuple[float | None, float | None]:
@@ -166,8 +166,8 @@ def find_limits(
         raise DropspinError(f"within: got {within!r}; give a number above 0, a ratio or an angle in radians.")
     chosen = _axes(scene, tuple(dict.fromkeys(axes)))
     entries = engine_entries(engines, IN_FLIGHT if scene.floor is None else ON_A_FLOOR)
-    left_out = {one.label: one.reason for one in entries if one.engine is None}
-    present = [one for one in entries if one.engine is not None]
+    left_out = {entry.label: entry.reason for entry in entries if entry.engine is None}
+    present = [entry for entry in entries if entry.engine is not None]
     nominal, callback = OperatingPoint(scene, dt), on_progress or ignore
 
     def refined(entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> tuple[ScanPoint, ...]:
@@ -181,9 +181,9 @@ def find_limits(
     pieces = list(product(present, chosen))
     with started_crews(jobs, len(pieces), present, resources) as crews:
         share = 1.0 / (1 + len(chosen))
-        found = results_in_parallel(present, refined, crews, lambda what, done: callback(what, share * done))
-        refinements = {entry.label: points for entry, points in zip(present, found, strict=True)}
-        scans = results_in_parallel(pieces, scanned, crews, lambda what, done: callback(what, share + (1.0 - share) * done))
+        results = results_in_parallel(present, refined, crews, lambda work, done: callback(work, share * done))
+        refinements = {entry.label: points for entry, points in zip(present, results, strict=True)}
+        scans = results_in_parallel(pieces, scanned, crews, lambda work, done: callback(work, share + (1.0 - share) * done))
     return RobustnessStudy(scene, dt, within, tuple(scans), left_out, refinements)
 
 
@@ -217,7 +217,7 @@ def refine(runner: Runner) -> tuple[ScanPoint, ...]:
 def scan_axis(runner: Runner, axis: Axis, near: float = NEAR, known: Sequence[ScanPoint] = ()) -> AxisScan:
     """Scan an axis with an engine: the initial values, then bisection between different failure modes; with diagnoses that are `known`."""
     base, diagnose = axis.base(runner.nominal), runner.along(axis)
-    points = {one.value: one for one in known}
+    points = {tried.value: tried for tried in known}
 
     def point(value: float) -> ScanPoint:
         if value not in points:
@@ -234,7 +234,7 @@ def scan_axis(runner: Runner, axis: Axis, near: float = NEAR, known: Sequence[Sc
             # Bisect to the value at which the failure mode of the lower point ends, and continue from there.
             below, above = low, high
             while (middle := axis.between(below.value, above.value, near)) is not None:
-                found = point(middle)
-                below, above = (found, above) if found.mode == low.mode else (below, found)
+                at_middle = point(middle)
+                below, above = (at_middle, above) if at_middle.mode == low.mode else (below, at_middle)
             low = above
     return AxisScan(axis, runner.entry.label, base, tuple(points[value] for value in sorted(points)))

@@ -77,10 +77,10 @@ def _representative_scene(jobs: Jobs) -> Scenario | None:
     shared = [(name, column[0]) for name, column in fields if name == FRICTION or not _is_array_field(name, column)]
     for others in ((), fields):
         try:
-            found = with_fields(jobs.scene, [*shared, *((name, column[0]) for name, column in others)])
+            scene = with_fields(jobs.scene, [*shared, *((name, column[0]) for name, column in others)])
         except SceneError:
             continue
-        return None if found.has_edges_or_walls else found
+        return None if scene.has_edges_or_walls else scene
     return None
 
 
@@ -170,16 +170,16 @@ def _bodies(scene: Scenario, columns: dict[Path, Array]) -> tuple[list[Body], ND
     """One body for all jobs, or one for each, and which of them are valid; the scene's own body replaces one that is not."""
     if not columns:
         return [scene.body], np.ones(1, dtype=bool)
-    found: list[Body] = []
+    bodies: list[Body] = []
     for values in zip(*columns.values(), strict=True):
         content = {"body": scene.body.model_dump(exclude_none=True)}
         for path, value in zip(columns, values, strict=True):
             set_field(content, path, float(value))
         try:
-            found.append(type(scene.body).model_validate(content["body"]))
+            bodies.append(type(scene.body).model_validate(content["body"]))
         except ValidationError:
-            found.append(scene.body)
-    tensors = np.array([body.inertia_tensor for body in found])
+            bodies.append(scene.body)
+    tensors = np.array([body.inertia_tensor for body in bodies])
     finite = np.isfinite(tensors).all(axis=(1, 2))
     is_definite = np.linalg.eigvalsh(np.where(finite[:, np.newaxis, np.newaxis], tensors, 0.0))[:, 0] > 0.0
-    return found, is_definite & np.array([body is not scene.body for body in found])
+    return bodies, is_definite & np.array([body is not scene.body for body in bodies])

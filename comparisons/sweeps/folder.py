@@ -109,8 +109,8 @@ class SweepFolder:
         self._files.invalidate_cache()
         pattern = re.compile(rf"(\d{{16}})-(\d{{16}})-{self._identity or '[0-9a-f]{12}'}\.parquet")
         matches = {path: pattern.fullmatch(os.path.basename(path)) for path in self._files.find(f"{self._root}/parts", withdirs=True)}
-        found = {range(int(match[1]), int(match[2])): path for path, match in matches.items() if match}
-        return dict(sorted(found.items(), key=lambda part: part[0].start))
+        parts = {range(int(match[1]), int(match[2])): path for path, match in matches.items() if match}
+        return dict(sorted(parts.items(), key=lambda part: part[0].start))
 
     def read(self, jobs: range, path: str, columns: list[str] | None = None) -> pa.Table:
         """Read a part.

@@ -138,22 +138,22 @@ def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str
 def _axes(where: str, table: Mapping[str, Any], draws: Draws | None = None) -> list[SweepAxis]:
     """The axes of the table [grid], or of [random] with its draws."""
     axes: list[SweepAxis] = []
-    for name, given in _flattened(table):
+    for name, entry in _flattened(table):
         here = f"{where}: {name}"
         if any(axis.name == name for axis in axes):
             raise DropspinError(f"{here}: is given twice; give it once.")
-        if isinstance(given, Mapping) and draws is None:
-            axes.append(Spaced(name, **validated(CountedRange, here, given).model_dump()))
-        elif isinstance(given, Mapping) and draws is not None:
-            axes.append(Drawn(name, **validated(Range, here, given).model_dump(), count=draws.count, seed=draws.seed))
-        elif isinstance(given, list) and given and draws is None:
-            values = tuple(_canonical(here, name, value) for value in given)
+        if isinstance(entry, Mapping) and draws is None:
+            axes.append(Spaced(name, **validated(CountedRange, here, entry).model_dump()))
+        elif isinstance(entry, Mapping) and draws is not None:
+            axes.append(Drawn(name, **validated(Range, here, entry).model_dump(), count=draws.count, seed=draws.seed))
+        elif isinstance(entry, list) and entry and draws is None:
+            values = tuple(_canonical(here, name, value) for value in entry)
             if len({repr(value) for value in values}) < len(values):
                 raise DropspinError(f"{here}: names a value twice; name each once.")
             axes.append(Listed(name, values))
         else:
             allowed = "a list of values, or {from, to, count}" if draws is None else "a range to draw from, {from, to}"
-            raise DropspinError(f"{here}: got {shown(given)}; must be {allowed}.")
+            raise DropspinError(f"{here}: got {shown(entry)}; must be {allowed}.")
     return axes
 
 

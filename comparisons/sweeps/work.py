@@ -110,23 +110,23 @@ class Work:
 
         def outcome(number: int) -> Outcomes:
             verify_running()
-            found = processes.call(entry, _run_in_process, self.sweep, number, number + 1)
-            if not isinstance(found, Breakdown):
-                return found
+            result = processes.call(entry, _run_in_process, self.sweep, number, number + 1)
+            if not isinstance(result, Breakdown):
+                return result
             verify_running()  # a process that ended with the sweep has not failed
             broken = not_run(1, self.sweep.metrics)
-            set_breakdown(broken[0], found)
+            set_breakdown(broken[0], result)
             return broken
 
         verify_running()
-        found = processes.call(entry, _run_in_process, self.sweep, first, last)
-        if isinstance(found, Breakdown):
+        outcomes = processes.call(entry, _run_in_process, self.sweep, first, last)
+        if isinstance(outcomes, Breakdown):
             return concatenated([outcome(number) for number in range(first, last)])
         # An exception may be due to earlier jobs, for example to a leak. It counts if the job raises it in a new process as well.
-        for index in np.flatnonzero(found.verdict == "crashed").tolist():
+        for index in np.flatnonzero(outcomes.verdict == "crashed").tolist():
             processes.renew(entry)
-            found[index] = outcome(first + index)[0]
-        return found
+            outcomes[index] = outcome(first + index)[0]
+        return outcomes
 
 
 def installed_versions() -> dict[str, str | None]:
@@ -136,7 +136,7 @@ def installed_versions() -> dict[str, str | None]:
 
 def _run_in_process(entry: EngineEntry, sweep: Sweep, first: int, last: int) -> Outcomes:
     """In the engine's process, where it is in place of its stand-in."""
-    engines = tuple(entry.engine if one.label == entry.label and entry.engine is not None else one for one in sweep.engines)
+    engines = tuple(entry.engine if engine.label == entry.label and entry.engine is not None else engine for engine in sweep.engines)
     return run_jobs(replace(sweep, engines=engines), first, last)
 
 
@@ -145,23 +145,23 @@ def run_jobs(sweep: Sweep, first: int, last: int) -> Outcomes:
 
     If an engine compiles, rounding may depend on how many of the jobs it simulates in a batch.
     """
-    found = []
+    outcomes = []
     for jobs in sweep.jobs(first, last):
         is_reference = isinstance(jobs.engine, Wang)
-        found.append(run_side_by_side(jobs, sweep.metrics) if is_reference else not_run(len(jobs), sweep.metrics))
-        run_scenes(jobs, found[-1], sweep.metrics, in_batches=jobs.engine.steps_batches and not is_reference)
-    return concatenated(found)
+        outcomes.append(run_side_by_side(jobs, sweep.metrics) if is_reference else not_run(len(jobs), sweep.metrics))
+        run_scenes(jobs, outcomes[-1], sweep.metrics, in_batches=jobs.engine.steps_batches and not is_reference)
+    return concatenated(outcomes)
 
 
-def _as_table(sweep: Sweep, jobs: Jobs, found: Outcomes) -> pa.Table:
+def _as_table(sweep: Sweep, jobs: Jobs, outcomes: Outcomes) -> pa.Table:
     """One row for each job."""
     identified = {"job": jobs.numbers, "key": jobs.hashes(), "scene": [jobs.scene.name] * len(jobs), "engine": jobs.labels()}
     columns: dict[str, Any] = identified | {"dt": jobs.dts, "seed": pa.array(jobs.starts(), pa.int64())}
     for axis in sweep.axes:
         if axis.name != "dt":
             values = jobs.values[axis.name]
-            columns[axis.name] = values if axis.is_numeric else [one if isinstance(one, str) else json.dumps(one) for one in values]
-    columns |= {"verdict": found.verdict, "reason": found.reason}
-    for names, array in ((STATE_COLUMNS, found.state), (STANDARD_METRICS, found.standard_metrics), (sweep.metrics, found.metrics)):
+            columns[axis.name] = values if axis.is_numeric else [value if isinstance(value, str) else json.dumps(value) for value in values]
+    columns |= {"verdict": outcomes.verdict, "reason": outcomes.reason}
+    for names, array in ((STATE_COLUMNS, outcomes.state), (STANDARD_METRICS, outcomes.standard_metrics), (sweep.metrics, outcomes.metrics)):
         columns |= dict(zip(names, array.T, strict=True))
-    return pa.table(columns | {"steps": found.steps, "time_per_step": found.time_per_step})
+    return pa.table(columns | {"steps": outcomes.steps, "time_per_step": outcomes.time_per_step})

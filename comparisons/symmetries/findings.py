@@ -98,19 +98,19 @@ def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Eff
     # What perturbations explain does not count, even if it is large.
     unexplained = float(difference[beyond].max())
     status: Status = "nearly kept" if unexplained <= MATTERS else "lost"
-    motions = pairs[int(np.argmax([one.max() for one in of_pairs]))] if status == "lost" else None
+    motions = pairs[int(np.argmax([values.max() for values in of_pairs]))] if status == "lost" else None
     return replace(none, status=status, difference=unexplained, step=first, time=first * dt, motions=motions)
 
 
 def _recent_maximum(values: Array) -> Array:
     """The largest value of the last half, at least, and of the last three quarters, at most, of the steps so far, shape (n,)."""
-    found = values.copy()
+    maxima = values.copy()
     start = 1
     while start < len(values):
         since = start // 2
-        found[start : 2 * start] = np.maximum.accumulate(values[since : 2 * start])[start - since :]
+        maxima[start : 2 * start] = np.maximum.accumulate(values[since : 2 * start])[start - since :]
         start *= 2
-    return found
+    return maxima
 
 
 def with_symmetries(results: Results, findings: Sequence[Finding], dt: float) -> Results:
@@ -125,25 +125,25 @@ def with_symmetries(results: Results, findings: Sequence[Finding], dt: float) ->
         dt: Their time step [s], one of the run.
     """
     ran = results.measurements.groupby(["scene", "engine"]).size().index
-    having = [one for one in findings if (one.scene, one.engine) in ran and (one.status != "not run" or one.verdict in BREAKDOWNS)]
-    rows = as_table([_row(one, dt) for one in having])
+    having = [finding for finding in findings if finding.status != "not run" or finding.verdict in BREAKDOWNS]
+    rows = as_table([_row(finding, dt) for finding in having if (finding.scene, finding.engine) in ran])
     return replace(results, table=pd.concat([results.table, rows], ignore_index=True))
 
 
-def _row(found: Finding, dt: float) -> Measurement:
-    kind, bound = kind_of(found.symmetry), 0.0 if found.symmetry in BITWISE else MATTERS
+def _row(finding: Finding, dt: float) -> Measurement:
+    kind, bound = kind_of(finding.symmetry), 0.0 if finding.symmetry in BITWISE else MATTERS
     assert kind is not None
     row = Measurement(
-        scene=found.scene, engine=found.engine, dt=dt, metric=found.symmetry, unit="1", kind=kind, upper=bound, verdict="passed"
+        scene=finding.scene, engine=finding.engine, dt=dt, metric=finding.symmetry, unit="1", kind=kind, upper=bound, verdict="passed"
     )
-    if found.status == "not run":
-        assert found.verdict
-        return replace(row, verdict=found.verdict, reason=found.reason)
-    fails = found.status == "lost" or (found.status == "nearly kept" and bound == 0.0)
+    if finding.status == "not run":
+        assert finding.verdict
+        return replace(row, verdict=finding.verdict, reason=finding.reason)
+    fails = finding.status == "lost" or (finding.status == "nearly kept" and bound == 0.0)
     differ = "the motions differ" if bound == 0.0 else "rounding does not explain the difference"
     reason = {"kept": "", "rounding": "rounding explains the difference"}.get(
-        found.status, f"{differ} from step {found.step} on, at {found.time:.4g} s"
+        finding.status, f"{differ} from step {finding.step} on, at {finding.time:.4g} s"
     )
     # What perturbations explain is due to chance, and is of another size on another machine.
-    tolerance = max(MATTERS, BY_CHANCE * found.difference * (found.status == "rounding"))
-    return replace(row, value=found.difference, tolerance=tolerance, verdict="failed" if fails else "passed", reason=reason)
+    tolerance = max(MATTERS, BY_CHANCE * finding.difference * (finding.status == "rounding"))
+    return replace(row, value=finding.difference, tolerance=tolerance, verdict="failed" if fails else "passed", reason=reason)

@@ -109,28 +109,28 @@ def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene:
 
     def effects_of(*both: tuple[EngineEntry, Array]) -> list[Array]:
         """Of rounding, on each of two engines."""
-        for entry, own in both:
+        for entry, states in both:
             if entry.label not in effects:
-                found = processes.call(entry, effects_of_rounding, scene, dt, own)
-                effects[entry.label] = [] if isinstance(found, Breakdown) else found
+                result = processes.call(entry, effects_of_rounding, scene, dt, states)
+                effects[entry.label] = [] if isinstance(result, Breakdown) else result
         return [effect for entry, _ in both for effect in effects[entry.label]]
 
     for entry, twin in combinations(entries, 2):
         none = TwinFinding(scene.name, entry.label, twin.label, "not run")
-        own, other = motions[entry.label], motions[twin.label]
-        if isinstance(own, Breakdown) or isinstance(other, Breakdown):
-            broken = [(one.label, motion) for one, motion in ((entry, own), (twin, other)) if isinstance(motion, Breakdown)]
-            yield replace(none, reason="; ".join(f"{label}: {one.reason.removesuffix('.')}" for label, one in broken))
+        first, second = motions[entry.label], motions[twin.label]
+        if isinstance(first, Breakdown) or isinstance(second, Breakdown):
+            broken = [(engine.label, motion) for engine, motion in ((entry, first), (twin, second)) if isinstance(motion, Breakdown)]
+            yield replace(none, reason="; ".join(f"{label}: {breakdown.reason.removesuffix('.')}" for label, breakdown in broken))
             continue
         coarser = max(entry.adapter.precision, twin.adapter.precision, key=lambda precision: float(np.finfo(precision).eps))
-        of_rounding = partial(effects_of, (entry, own), (twin, other))
-        judgement = judged(Finding(scene.name, entry.label, twin.label, "not run"), scene, dt, [(own, other)], of_rounding, coarser)
-        difference, times = differences(scene, own, other), dt * np.arange(len(own), dtype=float)
-        until = 1 + min(int(Motions.of(scene, Trajectory.from_states(times, states)).first_flight_end) for states in (own, other))
+        of_rounding = partial(effects_of, (entry, first), (twin, second))
+        judgement = judged(Finding(scene.name, entry.label, twin.label, "not run"), scene, dt, [(first, second)], of_rounding, coarser)
+        difference, times = differences(scene, first, second), dt * np.arange(len(first), dtype=float)
+        until = 1 + min(int(Motions.of(scene, Trajectory.from_states(times, states)).first_flight_end) for states in (first, second))
         yield replace(
             none,
             status=judgement.status,
-            first=_first((own != other).any(axis=1)),
+            first=_first((first != second).any(axis=1)),
             before_contact=float(difference[:until].max()),
             after_contact=float(difference[until:].max(initial=-np.inf)) if until < len(difference) else float("nan"),
             beyond={level: _first(difference > level) for level in LEVELS},

@@ -74,26 +74,26 @@ def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], w
     Raises:
         Breakdown: The engine cannot simulate batches.
     """
-    found = []
+    times = []
     for dt in dts[-1:] if scene.floor is None else dts:
         timed, steps = partial(_finite, time_steps, entry.adapter, [scene] * worlds, dt), scene.steps(dt)
-        found.append(math.nan)
+        times.append(math.nan)
         with suppress(Diverged):
             timed(1)  # compiles
             if scene.floor is None:
-                found[-1] = time_per_step(timings_in_flight(timed, FIRST_STEPS_OF_A_BATCH, 1, BATCH_SECONDS))
+                times[-1] = time_per_step(timings_in_flight(timed, FIRST_STEPS_OF_A_BATCH, 1, BATCH_SECONDS))
             elif timed(FIRST_STEPS).stepping * steps <= LONGEST_BATCH * FIRST_STEPS:
-                found[-1] = time_per_step([timed(steps)])
-    return [per_step / (dt * worlds) for dt, per_step in zip(dts, found * (len(dts) // len(found)), strict=True)]
+                times[-1] = time_per_step([timed(steps)])
+    return [per_step / (dt * worlds) for dt, per_step in zip(dts, times * (len(dts) // len(times)), strict=True)]
 
 
-def _finite(time_them: Callable[..., TimedSteps], *given: Any) -> TimedSteps:
+def _finite(time_them: Callable[..., TimedSteps], *args: Any) -> TimedSteps:
     """A timing of steps after which the states are finite.
 
     Raises:
         Diverged: They are not.
     """
-    timed = time_them(*given)
+    timed = time_them(*args)
     if not np.isfinite(timed.state).all():
         raise Diverged("the state is not finite")
     return timed
@@ -121,6 +121,6 @@ def memory_per_world(entry: EngineEntry, scene: Scenario, dt: float, worlds: int
 
 def _process_memory(key: str) -> int:
     """A number of this process's status: its present memory, `VmRSS`, or the peak of that, `VmHWM` [bytes]."""
-    found = re.search(rf"^{key}:\s+(\d+) kB$", (PROCESS / "status").read_text(), re.MULTILINE)
-    assert found is not None
-    return 1024 * int(found[1])
+    match = re.search(rf"^{key}:\s+(\d+) kB$", (PROCESS / "status").read_text(), re.MULTILINE)
+    assert match is not None
+    return 1024 * int(match[1])

@@ -128,16 +128,17 @@ class TradeOff:
 
     def batch_pareto_front(self, worlds: int) -> list[CostPoint]:
         """The Pareto front by cost per world in batches of a size, for engines that can simulate them."""
-        return _pareto_front([one for one in self.points if worlds in one.costs_per_world], lambda point: point.costs_per_world[worlds])
+        points = [point for point in self.points if worlds in point.costs_per_world]
+        return _pareto_front(points, lambda point: point.costs_per_world[worlds])
 
     @property
     def dominated(self) -> dict[CostPoint, CostPoint]:
         """For each engine that is not on the Pareto front, its most accurate configuration and the cheapest one that is as accurate."""
         front = self.pareto_front
-        best = {point.engine: point for point in sorted(self.points, key=lambda one: one.error, reverse=True)}
+        best = {point.engine: point for point in sorted(self.points, key=lambda point: point.error, reverse=True)}
         on_front = {point.engine for point in front}
         inside = [best[ladder.engine] for ladder in self.ladders if ladder.engine in best.keys() - on_front]
-        return {point: next(one for one in front if one.error <= point.error) for point in inside}
+        return {point: next(other for other in front if other.error <= point.error) for point in inside}
 
     def recommendation(self, within: float) -> Recommendation | None:
         """The cheapest configuration within a tolerance; None if there is none.
@@ -148,10 +149,10 @@ class TradeOff:
         A time step counts only if all finer ones of the engine are within the tolerance too; at a coarser one the error may be small by
         chance, where it crosses 0.
         """
-        cheapest = {point.engine: point for point in sorted(self._within(within), key=lambda one: one.typical_cost, reverse=True)}
+        cheapest = {point.engine: point for point in sorted(self._within(within), key=lambda point: point.typical_cost, reverse=True)}
         if not cheapest:
             return None
-        best, *others = sorted(cheapest.values(), key=lambda one: one.typical_cost)
+        best, *others = sorted(cheapest.values(), key=lambda point: point.typical_cost)
         if not others:
             return Recommendation(within, best, None, math.nan, False)
         ratios = others[0].cost / best.cost
@@ -171,18 +172,18 @@ class TradeOff:
 
     def _within(self, within: float) -> list[CostPoint]:
         """The configurations within a tolerance, with those of the same engine at all finer time steps."""
-        found, exceeded = [], set()
-        for point in sorted(self.points, key=lambda one: one.dt):
+        kept, exceeded = [], set()
+        for point in sorted(self.points, key=lambda point: point.dt):
             if point.error > within:
                 exceeded.add(point.engine)
             if point.engine not in exceeded:
-                found.append(point)
-        return found
+                kept.append(point)
+        return kept
 
 
 def _pareto_front(points: Sequence[CostPoint], cost: Callable[[CostPoint], float]) -> list[CostPoint]:
     front: list[CostPoint] = []
-    for point in sorted(points, key=lambda one: (cost(one), one.error)):
+    for point in sorted(points, key=lambda point: (cost(point), point.error)):
         if not front or point.error < front[-1].error:
             front.append(point)
     return front

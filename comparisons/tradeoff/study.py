@@ -90,11 +90,11 @@ def tradeoff(
         raise DropspinError(f"{scene.name} has no exact solution to compare with; choose a scene that has one (see dropspin list).")
     of_the_motion = leading_metric(scene)
     chosen = of_the_motion if metric is None else metric
-    known = [one.name for one in metrics_for(scene, truth)]
+    known = [allowed.name for allowed in metrics_for(scene, truth)]
     verify_known(f"{scene.name}'s metric", [chosen], known)
     asked = engine_entries(engines, IN_FLIGHT if scene.floor is None else ON_A_FLOOR)
     levels = {entry.label: [] if entry.engine is None else entry.engine.accuracy_levels() for entry in asked}
-    entries = {one.label: one for entry in asked for one in (entry, *engine_entries(levels[entry.label]))}
+    entries = {level.label: level for entry in asked for level in (entry, *engine_entries(levels[entry.label]))}
     report = on_progress or ignore
 
     def errors(entry: EngineEntry, processes: EngineProcesses, report_errors: Callable[[str], None]) -> Ladder:
@@ -105,17 +105,17 @@ def tradeoff(
         processes.start([entry for entry in entries.values() if not entry.absence])
         # Each engine has one process, in which it has compiled when its costs are measured.
         crews = [processes] * min(as_jobs(jobs), len(entries))
-        ladders = results_in_parallel(list(entries.values()), errors, crews, lambda what, share: report(what, 0.5 * share))
-        compared = [(entries[one.engine], one) for one in ladders if not one.left_out]
+        ladders = results_in_parallel(list(entries.values()), errors, crews, lambda work, share: report(work, 0.5 * share))
+        compared = [(entries[ladder.engine], ladder) for ladder in ladders if not ladder.left_out]
         points, others = _with_costs(compared, scene, sizes, processes, report)
         memory = _memory(entries, points, scene, sizes[-1], processes)
     measured = {point.engine for point in points}
-    ladders = [one if one.left_out or one.engine in measured else replace(one, left_out=NO_COST) for one in ladders]
-    found = TradeOff(scene, chosen, points, tuple(ladders), sizes, memory, others)
+    ladders = [ladder if ladder.left_out or ladder.engine in measured else replace(ladder, left_out=NO_COST) for ladder in ladders]
+    result = TradeOff(scene, chosen, points, tuple(ladders), sizes, memory, others)
     if not points:
-        reasons = "; ".join(f"{label}: {why.removesuffix('.')}" for label, why in found.left_out.items())
+        reasons = "; ".join(f"{label}: {why.removesuffix('.')}" for label, why in result.left_out.items())
         raise DropspinError(f"no engine runs {scene.name}: {reasons}.")
-    return found
+    return result
 
 
 def _with_costs(
@@ -161,11 +161,11 @@ def _memory(
     if worlds < LARGE_BATCH:
         return {}
     dts = {point.engine: point.dt for point in reversed(points) if worlds in point.costs_per_world}
-    found = {
+    memories = {
         label: _or_nan(processes.call(entries[label], memory_per_world, scene, dts[label], worlds)) for label in entries if label in dts
     }
-    return {label: memory for label, memory in found.items() if np.isfinite(memory)}
+    return {label: memory for label, memory in memories.items() if np.isfinite(memory)}
 
 
-def _or_nan(found: Result | Breakdown) -> Result | float:
-    return math.nan if isinstance(found, Breakdown) else found
+def _or_nan(value: Result | Breakdown) -> Result | float:
+    return math.nan if isinstance(value, Breakdown) else value

@@ -103,13 +103,13 @@ def calibrate(
     entry, scene = present_entry(engine), drop(restitution, friction, shape)
     verify_time_step(scene, dt)
     with EngineProcesses(resources) as processes:
-        calibrated = processes.call(entry, _calibrated, scene, dt)
-    if isinstance(calibrated, Breakdown):
-        failure = "cannot be calibrated" if calibrated.verdict == "declined" else "broke down with these settings"
-        raise DropspinError(f"{entry.label} {failure}: {calibrated.reason}.")
-    if calibrated is None:
+        result = processes.call(entry, _calibrated, scene, dt)
+    if isinstance(result, Breakdown):
+        failure = "cannot be calibrated" if result.verdict == "declined" else "broke down with these settings"
+        raise DropspinError(f"{entry.label} {failure}: {result.reason}.")
+    if result is None:
         raise DropspinError(f"{entry.label} has no settings to calibrate; use mujoco or pybullet.")
-    return calibrated
+    return result
 
 
 def drop(restitution: float, friction: str | float = "none", shape: Shape = "ball") -> Scenario:

@@ -193,23 +193,23 @@ def check_later_impacts(engine: Engine) -> str:
     decay = decaying_restitution(engine)
     if decay is not None:
         raise CheckFailed(decay)
-    bounces = restitutions(engine)
-    if len(bounces) >= FEWEST and abs(bounces[1][0] - bounces[0][0]) > CHANGED * bounces[0][0]:
-        raise Noted(f"restitution depends on the speed: {', '.join(f'{e:.3g} at {speed:.3g} m/s' for e, speed in bounces)}")
-    return f"restitution in successive impacts: {', '.join(f'{e:.3g}' for e, _ in bounces)}"
+    pairs = restitutions(engine)
+    if len(pairs) >= FEWEST and abs(pairs[1][0] - pairs[0][0]) > CHANGED * pairs[0][0]:
+        raise Noted(f"restitution depends on the speed: {', '.join(f'{e:.3g} at {speed:.3g} m/s' for e, speed in pairs)}")
+    return f"restitution in successive impacts: {', '.join(f'{e:.3g}' for e, _ in pairs)}"
 
 
 def decaying_restitution(engine: Engine) -> str | None:
     """A message if restitution falls from impact to impact, whatever the speed of the fall; None if it does not."""
-    bounces = restitutions(engine)
-    if len(bounces) < FEWEST or any(later[0] > (1.0 - FALL) * earlier[0] for earlier, later in pairwise(bounces)):
+    pairs = restitutions(engine)
+    if len(pairs) < FEWEST or any(later[0] > (1.0 - FALL) * earlier[0] for earlier, later in pairwise(pairs)):
         return None
-    close = SAME * (bounces[0][0] - bounces[1][0])
-    for speed in (bounces[1][1], 1.2 * bounces[0][1]):
+    close = SAME * (pairs[0][0] - pairs[1][0])
+    for speed in (pairs[1][1], 1.2 * pairs[0][1]):
         others = restitutions(engine, speed)
-        if not others or any(abs(first[0] - second[0]) > close for first, second in zip(bounces[:2], others, strict=False)):
+        if not others or any(abs(first[0] - second[0]) > close for first, second in zip(pairs[:2], others, strict=False)):
             return None
-    return f"{LATER}: {', '.join(rounded(e, 2) for e, _ in bounces)} in successive impacts; a scene has one restitution for all of them"
+    return f"{LATER}: {', '.join(rounded(e, 2) for e, _ in pairs)} in successive impacts; a scene has one restitution for all of them"
 
 
 def restitutions(engine: Engine, speed: float | None = None) -> list[tuple[float, float]]:

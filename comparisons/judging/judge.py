@@ -95,10 +95,10 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, conver
         verdict = "measured"
     elif budget.cause in ("model", "setting"):
         matching = _matching(scene, claim.label, convergence.finest, metric)
-        allowing = _narrowest([expectation for expectation in matching if expectation.engine is not None])
-        bounds = [_bounds(expectation, metric) for expectation in allowing]
+        allowing = _narrowest([expected for expected in matching if expected.engine is not None])
+        bounds = [_bounds(expected, metric) for expected in allowing]
         if bounds and all(budget.lower <= upper and budget.upper >= lower for lower, upper in bounds):
-            verdict, reason = "known", "; ".join(expectation.reason for expectation in allowing)
+            verdict, reason = "known", "; ".join(expected.reason for expected in allowing)
         else:
             explained = _explained(claim, metric, max(budget.lower, -budget.upper))
             verdict, reason = "limited" if explained else "failed", joined(*explained, f"{reason}; no time step removes it")
@@ -153,9 +153,9 @@ def compared_with_expectations(scene: Scenario, label: str, dt: float, metric: M
     matching = _matching(scene, label, dt, metric)
     if not matching:
         return Judgement(value, "measured")
-    binding, of_all = _narrowest(matching), [expectation for expectation in matching if expectation.engine is None]
+    binding, of_all = _narrowest(matching), [expected for expected in matching if expected.engine is None]
     lower, upper = _strictest(binding, metric)
-    reason, is_met = "; ".join(expectation.reason for expectation in binding), lower <= value <= upper
+    reason, is_met = "; ".join(expected.reason for expected in binding), lower <= value <= upper
     verdict: Verdict = "passed" if is_met else "failed"
     basis: Basis = ""
     if binding[0].engine is not None and _expect_fault(scene, binding, metric):
@@ -175,23 +175,23 @@ def compared_with_expectations(scene: Scenario, label: str, dt: float, metric: M
 def _matching(scene: Scenario, label: str, dt: float, metric: Metric) -> list[Expectation]:
     """The expectations of a metric that apply to an engine at a time step [s]."""
     return [
-        expectation
-        for expectation in scene.expect
-        if expectation.metric == metric.name
-        and expectation.engine in (None, label)
-        and (expectation.dt is None or any(math.isclose(step, dt, rel_tol=1e-9) for step in expectation.dt))
+        expected
+        for expected in scene.expect
+        if expected.metric == metric.name
+        and expected.engine in (None, label)
+        and (expected.dt is None or any(math.isclose(step, dt, rel_tol=1e-9) for step in expected.dt))
     ]
 
 
 def _narrowest(expectations: Sequence[Expectation]) -> list[Expectation]:
     """The most specific expectations: for an engine at a time step, else for an engine, else for a time step, else for all."""
-    narrowness = [2 * (expectation.engine is not None) + (expectation.dt is not None) for expectation in expectations]
-    return [expectation for expectation, narrow in zip(expectations, narrowness, strict=True) if narrow == max(narrowness)]
+    narrowness = [2 * (expected.engine is not None) + (expected.dt is not None) for expected in expectations]
+    return [expected for expected, narrow in zip(expectations, narrowness, strict=True) if narrow == max(narrowness)]
 
 
 def _strictest(expectations: Sequence[Expectation], metric: Metric) -> tuple[float, float]:
     """The bounds of expectations that must all be met."""
-    lowers, uppers = zip(*(_bounds(expectation, metric) for expectation in expectations), strict=True)
+    lowers, uppers = zip(*(_bounds(expected, metric) for expected in expectations), strict=True)
     return max(lowers), min(uppers)
 
 

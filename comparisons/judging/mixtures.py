@@ -35,9 +35,9 @@ def quantiles(below: Callable[[Array], Array], wanted: tuple[float, ...], near: 
     below_low, below_high = (below(near + unit * np.sinh(ends)) for ends in (low, high))
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        below_middle = below(near + unit * np.sinh(middle))
-        is_above = below_middle < targets
+        chance = below(near + unit * np.sinh(middle))
+        is_above = chance < targets
         low, high = np.where(is_above, middle, low), np.where(is_above, high, middle)
-        below_low, below_high = np.where(is_above, below_middle, below_low), np.where(is_above, below_high, below_middle)
+        below_low, below_high = np.where(is_above, chance, below_low), np.where(is_above, below_high, chance)
     share = (targets - below_low) / np.maximum(below_high - below_low, np.finfo(float).tiny)
     return [float(x) for x in near + unit * np.sinh(low + np.clip(share, 0.0, 1.0) * (high - low))]

@@ -75,20 +75,20 @@ def compute_states(all_states: Sequence[States]) -> Iterator[tuple[slice, Array,
     Yields:
         For each batch of motions whose states are finite: which of the motions they are, their states, shape (B, n, 13), and the motions.
     """
-    lengths = [len(member.motion) for member in all_states]
+    lengths = [len(item.motion) for item in all_states]
     edges = [0, *(number for number in range(1, len(all_states)) if lengths[number] != lengths[number - 1]), len(all_states)]
     batches = [(start, end, max(1, BATCH_BYTES // (max(lengths[start], 1) * 13 * 8))) for start, end in pairwise(edges)]
     for numbers in (slice(first, min(first + many, end)) for start, end, many in batches for first in range(start, end, many)):
         batch, rows = all_states[numbers], lengths[numbers.start]
         if rows < 2:
             continue
-        setup = Setup.of_starts([member.scene for member in batch])
-        states, lag = np.stack([member.motion.states for member in batch]), np.array([member.motion.velocity_lag for member in batch])
+        setup = Setup.of_starts([item.scene for item in batch])
+        states, lag = np.stack([item.motion.states for item in batch]), np.array([item.motion.velocity_lag for item in batch])
         dt, last_row = np.full(len(batch), batch[0].motion.t[1] - batch[0].motion.t[0]), np.full(len(batch), rows - 1)
         together, valid = motions_side_by_side(setup, states, dt, lag, last_row, np.inf)
         if valid.all():
-            for number, member in enumerate(batch):
-                vars(member).update({name: getattr(together.states, name)[number] for name in AT_ONCE})
+            for number, item in enumerate(batch):
+                vars(item).update({name: getattr(together.states, name)[number] for name in AT_ONCE})
             yield numbers, states, together
 
 

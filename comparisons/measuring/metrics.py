@@ -92,8 +92,8 @@ def bounce_height_error(case: Comparison) -> float:
     if len(case.flights) < 2:
         raise Unresolved(f"the flight after the impact is too short for steps of {case.dt:g} s")
     rows = case.flights[1]
-    measured, exact = (apex(case.scene, motion[rows]) for motion in (case.compared, case.exact))
-    return float(np.mean(measured - exact)) / case.scene.clearance
+    actual, exact = (apex(case.scene, motion[rows]) for motion in (case.compared, case.exact))
+    return float(np.mean(actual - exact)) / case.scene.clearance
 
 
 @_metric("1", "truth", requirements.has_newton_restitution, signed=True, first_flight=True)
@@ -144,10 +144,10 @@ def rest_time_error(case: Comparison) -> float:
 
     The body is in motion while its kinetic energy, including rotation, exceeds M (2 g dt)²/2 and 1e-6 M g times its size.
     """
-    measured, exact = (float(motion.t[Motions.of(case.scene, motion).last_row_in_motion]) for motion in (case.compared, case.exact))
+    actual, exact = (float(motion.t[Motions.of(case.scene, motion).last_row_in_motion]) for motion in (case.compared, case.exact))
     if exact == 0.0:
         raise Unresolved(f"the body is never faster than 2 g dt, with dt = {case.dt:g} s")
-    return (measured - exact) / exact
+    return (actual - exact) / exact
 
 
 @_metric("m/s", "truth", requirements.comes_to_rest)
@@ -165,8 +165,8 @@ def landing_error(case: Comparison) -> float:
         raise Unresolved(f"the body falls and rises again within {SHORTEST_FLIGHT} steps of {case.dt:g} s")
     rows = np.searchsorted(case.motion.t, case.impacts[0]) + np.array([-LANDING, LANDING])
     axis = case.exact.angular_velocity[rows[0]]
-    measured, exact = (motion.angular_velocity[rows] @ axis for motion in (case.compared, case.exact))
-    return float(measured[1] / measured[0] - exact[1] / exact[0])
+    actual, exact = (motion.angular_velocity[rows] @ axis for motion in (case.compared, case.exact))
+    return float(actual[1] / actual[0] - exact[1] / exact[0])
 
 
 @_metric("1/s", "truth", requirements.repeats_impacts)

@@ -54,16 +54,16 @@ def nesc_brick(source: Source) -> Iterator[Result]:
         yield _beside_exact(source, name, quantity, text, error, is_claimed=False)
 
 
-def _beside_exact(source: Source, tool: str, quantity: str, published: str, compared: Agreement, *, is_claimed: bool = True) -> Result:
+def _beside_exact(source: Source, tool: str, quantity: str, published: str, match: Agreement, *, is_claimed: bool = True) -> Result:
     """A published value beside the exact one; of one that is not claimed to be exact, its error."""
-    status: Status = compared.status if is_claimed else "error of the source"
-    return Result(source.name, tool, quantity, published, compared.here, EXACT, status, difference=compared.difference)
+    status: Status = match.status if is_claimed else "error of the source"
+    return Result(source.name, tool, quantity, published, match.here, EXACT, status, difference=match.difference)
 
 
 def _count(source: Source, tool: str, quantity: str, published: int, here: int) -> Result:
     """How many of some values have equal digits."""
-    compared = Agreement(f"{here} equal", float(here - published), here == published)
-    return _beside_exact(source, tool, quantity, f"{published} equal", compared)
+    match = Agreement(f"{here} equal", float(here - published), here == published)
+    return _beside_exact(source, tool, quantity, f"{published} equal", match)
 
 
 def _digits(source: Source, tool: str, quantity: str, published: float, here: float) -> Result:
@@ -129,9 +129,9 @@ def _simple_rotation(source: Source, scene: Scenario, axis: Sequence[float], rat
     expected = about(direction, np.array([rate * time]))[0]
     error = float(min(np.abs(quaternion - expected).max(), np.abs(quaternion + expected).max()))
     bound = f"≤ {source.parameters['simple']['bound_in_epsilon'] * EPSILON:.2g}"
-    compared = agreement(bound, error)._replace(here=f"{error:.2g}")
+    match = agreement(bound, error)._replace(here=f"{error:.2g}")
     quantity = f"quaternion, axis {' '.join(f'{component:g}' for component in axis)}"
-    return _beside_exact(source, "simple rotation", quantity, bound, compared)
+    return _beside_exact(source, "simple rotation", quantity, bound, match)
 
 
 def housner_block(source: Source) -> Iterator[Result]:
@@ -146,12 +146,12 @@ def housner_block(source: Source) -> Iterator[Result]:
     for alpha, share, digits in source.parameters["periods"]:
         published = housner_period(share)
         exact = 4.0 * truth_of(rocking_scene(alpha, share)).events[0].time
-        compared = agreement(f"{published:.{digits}g}", exact, digits)
+        match = agreement(f"{published:.{digits}g}", exact, digits)
         is_slender = alpha == source.parameters["slender"]
         if not is_slender:
-            compared = compared._replace(difference=published - exact)
+            match = match._replace(difference=published - exact)
         quantity = f"T [s], α = {alpha:g}, θ₀ = {share:g} α"
-        yield _beside_exact(source, "period", quantity, f"{published:.{digits}g}", compared, is_claimed=is_slender)
+        yield _beside_exact(source, "period", quantity, f"{published:.{digits}g}", match, is_claimed=is_slender)
 
 
 RADIUS, GRAVITY = 1.0, 9.81

@@ -90,6 +90,6 @@ def _of_case(source: Source, group: Group, case: Case, measured: list[float] | B
         elif printed == ABSENT:
             yield replace(result, here=f"{value:.{SHOWN}g}", status="for comparison")
         else:
-            compared = agreement(printed, value, source.significant)
-            result = replace(result, here=compared.here, difference=compared.difference, status=compared.status)
-            yield replace(result, status="not reproducible", reason=group.why_not) if group.why_not and not compared.agrees else result
+            match = agreement(printed, value, source.significant)
+            result = replace(result, here=match.here, difference=match.difference, status=match.status)
+            yield replace(result, status="not reproducible", reason=group.why_not) if group.why_not and not match.agrees else result

@@ -108,10 +108,10 @@ def _result(name: str, run: Run, quantity: str, printed: str, value: float | Bre
         if why_not:
             return Result(name, run["tool"], label, printed, "", run["by"], "not reproducible", why_not)
         return Result(name, run["tool"], label, printed, "", run["by"], "not run", value.reason, verdict=value.verdict)
-    compared = agreement(printed, value)
+    match = agreement(printed, value)
     if why_not:
-        return Result(name, run["tool"], label, printed, f"{value:.{SHOWN}g}", run["by"], "not reproducible", why_not, compared.difference)
-    return Result(name, run["tool"], label, printed, compared.here, run["by"], compared.status, difference=compared.difference)
+        return Result(name, run["tool"], label, printed, f"{value:.{SHOWN}g}", run["by"], "not reproducible", why_not, match.difference)
+    return Result(name, run["tool"], label, printed, match.here, run["by"], match.status, difference=match.difference)
 
 
 def _simulated(entry: EngineEntry, cube: Cube, run: Run, tosses: list[Array]) -> dict[str, float]:

@@ -234,7 +234,7 @@ def scan_axis(runner: Runner, axis: Axis, near: float = NEAR, known: Sequence[Sc
             # Bisect to the value at which the failure mode of the lower point ends, and continue from there.
             below, above = low, high
             while (middle := axis.between(below.value, above.value, near)) is not None:
-                at_middle = point(middle)
-                below, above = (at_middle, above) if at_middle.mode == low.mode else (below, at_middle)
+                inner = point(middle)
+                below, above = (inner, above) if inner.mode == low.mode else (below, inner)
             low = above
     return AxisScan(axis, runner.entry.label, base, tuple(points[value] for value in sorted(points)))

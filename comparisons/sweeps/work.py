@@ -145,12 +145,12 @@ def run_jobs(sweep: Sweep, first: int, last: int) -> Outcomes:
 
     If an engine compiles, rounding may depend on how many of the jobs it simulates in a batch.
     """
-    outcomes = []
+    parts = []
     for jobs in sweep.jobs(first, last):
         is_reference = isinstance(jobs.engine, Wang)
-        outcomes.append(run_side_by_side(jobs, sweep.metrics) if is_reference else not_run(len(jobs), sweep.metrics))
-        run_scenes(jobs, outcomes[-1], sweep.metrics, in_batches=jobs.engine.steps_batches and not is_reference)
-    return concatenated(outcomes)
+        parts.append(run_side_by_side(jobs, sweep.metrics) if is_reference else not_run(len(jobs), sweep.metrics))
+        run_scenes(jobs, parts[-1], sweep.metrics, in_batches=jobs.engine.steps_batches and not is_reference)
+    return concatenated(parts)
 
 
 def _as_table(sweep: Sweep, jobs: Jobs, outcomes: Outcomes) -> pa.Table:

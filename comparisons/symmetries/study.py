@@ -84,10 +84,10 @@ def _of_engine(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, 
     compared = processes.call(entry, _compare, scene, dt)
     if isinstance(compared, Breakdown):
         return [not_run(replace(none, symmetry=name), compared) for name in NAMES]
-    states, findings = compared
+    rows, findings = compared
     for name in IN_NEW_PROCESSES:
         processes.renew(entry)
-        again = processes.call(entry, _in_new_process, scene, dt, states, name)
+        again = processes.call(entry, _in_new_process, scene, dt, rows, name)
         findings.append(not_run(replace(none, symmetry=name), again) if isinstance(again, Breakdown) else again)
     processes.renew(entry)  # the last one may use one processor only
     return findings
@@ -95,39 +95,39 @@ def _of_engine(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, 
 
 def _compare(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array, list[Finding]]:
     """The engine's motion, and all findings that one process can give."""
-    states = states_of(entry, scene, dt)
+    rows = states_of(entry, scene, dt)
     names = [name for name in NAMES if name not in IN_NEW_PROCESSES]
-    return states, findings_of(entry, scene, dt, states, [*names, *entry.adapter.represented_otherwise()])
+    return rows, findings_of(entry, scene, dt, rows, [*names, *entry.adapter.represented_otherwise()])
 
 
-def _in_new_process(entry: EngineEntry, scene: Scenario, dt: float, states: Array, name: str) -> Finding:
+def _in_new_process(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: str) -> Finding:
     """The finding of a repeated run in a process that did nothing before; for `ONE_CORE`, all its threads may use one processor."""
     if name == ONE_CORE:
         if not hasattr(os, "sched_setaffinity") or usable_cores() == 1:
             raise Breakdown("declined", "the process cannot be restricted to fewer processors")
         for thread in os.listdir("/proc/self/task"):
             os.sched_setaffinity(int(thread), {min(os.sched_getaffinity(0))})
-    return replace(_finding(entry, scene, dt, states, IN_NEW_PROCESSES[name]), symmetry=name)
+    return replace(_finding(entry, scene, dt, rows, IN_NEW_PROCESSES[name]), symmetry=name)
 
 
-def findings_of(entry: EngineEntry, scene: Scenario, dt: float, states: Array, names: Iterable[str]) -> list[Finding]:
+def findings_of(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, names: Iterable[str]) -> list[Finding]:
     """The findings on some symmetries that the scene has; runs in the engine's process.
 
     Args:
         entry: The engine.
         scene: The scene.
         dt: Time step [s].
-        states: The states of the engine's motion at each time step, shape (n, 13).
+        rows: The states of the engine's motion at each time step, shape (n, 13).
         names: Names of symmetries, and of ways to repeat the run.
     """
     applicable = [name for name in names if name not in SYMMETRIES or SYMMETRIES[name].applies(scene)]
-    return [_finding(entry, scene, dt, states, name) for name in applicable]
+    return [_finding(entry, scene, dt, rows, name) for name in applicable]
 
 
-def _finding(entry: EngineEntry, scene: Scenario, dt: float, states: Array, name: str) -> Finding:
+def _finding(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: str) -> Finding:
     none = Finding(scene.name, entry.label, name, "not run")
     try:
-        pairs, effects = _pairs(entry, scene, dt, states, name)
+        pairs, effects = _pairs(entry, scene, dt, rows, name)
         return judged(none, scene, dt, pairs, effects, entry.adapter.precision)
     except DropspinError as error:  # the transformed scene is no valid scene
         return not_run(none, Breakdown("declined", str(error)))
@@ -135,23 +135,23 @@ def _finding(entry: EngineEntry, scene: Scenario, dt: float, states: Array, name
         return not_run(none, classify(error))
 
 
-def _pairs(entry: EngineEntry, scene: Scenario, dt: float, states: Array, name: str) -> tuple[Pairs, Effects | None]:
+def _pairs(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: str) -> tuple[Pairs, Effects | None]:
     """The motions that should be equal, and the function that measures effects of rounding; None if it has no effect."""
-    effects = partial(effects_of_rounding, entry, scene, dt, states)
+    effects = partial(effects_of_rounding, entry, scene, dt, rows)
     if name == AGAIN:
-        return [(states, states_of(entry, scene, dt))], None
+        return [(rows, states_of(entry, scene, dt))], None
     if name in SYMMETRIES:
-        return _transformed(entry, scene, dt, states, SYMMETRIES[name])
+        return _transformed(entry, scene, dt, rows, SYMMETRIES[name])
     if name == HALVES:
-        return _halves(entry, scene, dt, states)
+        return _halves(entry, scene, dt, rows)
     if name == BATCH:
         # A compiler vectorises a batch differently from a single simulation, and rounding depends on that.
         others = [batch_member(entry.adapter, scene, share) for share in FASTER]
         together = [finite(recording).states for recording in record_batch(entry.adapter, [scene, *others], dt)]
-        alone = [states, *(states_of(entry, other, dt) for other in others)]
+        alone = [rows, *(states_of(entry, other, dt) for other in others)]
         return list(zip(alone, together, strict=True)), effects if entry.adapter.compiles else None
     other = replace(entry, engine=entry.adapter.represented_otherwise()[name])
-    return [(states, states_of(other, scene, dt))], effects
+    return [(rows, states_of(other, scene, dt))], effects
 
 
 def batch_member(engine: Engine, scene: Scenario, share: float) -> Scenario:
@@ -162,38 +162,38 @@ def batch_member(engine: Engine, scene: Scenario, share: float) -> Scenario:
     return (with_other_numbers(scene, share) if engine.mixes_scenes else scene).starting_at(start)
 
 
-def _halves(entry: EngineEntry, scene: Scenario, dt: float, states: Array) -> tuple[Pairs, Effects]:
+def _halves(entry: EngineEntry, scene: Scenario, dt: float, rows: Array) -> tuple[Pairs, Effects]:
     """A motion that is stopped half way and continued."""
-    half = len(states) // 2
-    nominal = whole_steps(scene, dt, len(states) - 1 - half).starting_at(states[half])
+    half = len(rows) // 2
+    nominal = whole_steps(scene, dt, len(rows) - 1 - half).starting_at(rows[half])
     rest = states_of(entry, nominal, dt)
 
     def effects() -> list[Array]:
         return [np.concatenate([np.zeros(half), effect]) for effect in effects_of_rounding(entry, nominal, dt, rest)]
 
-    return [(states, np.concatenate([states[:half], rest]))], effects
+    return [(rows, np.concatenate([rows[:half], rest]))], effects
 
 
-def _transformed(entry: EngineEntry, scene: Scenario, dt: float, states: Array, symmetry: Symmetry) -> tuple[Pairs, Effects]:
+def _transformed(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, symmetry: Symmetry) -> tuple[Pairs, Effects]:
     """The motion of a transformed scene, transformed back."""
-    times, transformed = dt * np.arange(len(states), dtype=float), symmetry.transformed(scene)
-    image = states_of(entry, transformed, symmetry.time * dt)
+    times, transformed = dt * np.arange(len(rows), dtype=float), symmetry.transformed(scene)
+    states = states_of(entry, transformed, symmetry.time * dt)
 
     def effects() -> list[Array]:
         starts = [symmetry.back(times[:1], start.initial_state[np.newaxis])[0] for start in perturbed_starts(entry, transformed)]
-        return effects_of_rounding(entry, scene, dt, states, map(scene.starting_at, starts))
+        return effects_of_rounding(entry, scene, dt, rows, map(scene.starting_at, starts))
 
-    return [(states, symmetry.back(times, image))], effects
+    return [(rows, symmetry.back(times, states))], effects
 
 
 def effects_of_rounding(
-    entry: EngineEntry, scene: Scenario, dt: float, states: Array, starts: Iterable[Scenario] | None = None
+    entry: EngineEntry, scene: Scenario, dt: float, rows: Array, starts: Iterable[Scenario] | None = None
 ) -> list[Array]:
     """The differences of an engine's motion of a scene, states of shape (n, 13), and those from perturbed starts, each of shape (n,)."""
     effects = []
     for start in perturbed_starts(entry, scene) if starts is None else starts:
         with suppress(Breakdown):
-            effects.append(differences(scene, states, states_of(entry, start, dt)))
+            effects.append(differences(scene, rows, states_of(entry, start, dt)))
     return effects
 
 

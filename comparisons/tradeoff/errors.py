@@ -93,17 +93,17 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
     spent = 0.0
     ended: Ending = "longest_run"
     reason = f"a run at the next smaller time step would have more than {most:,} steps"
-    measured = processes.call(entry, _errors, scene, interval, 1, metrics)  # compiles and warms up before anything is timed
-    if isinstance(measured, Breakdown):
-        return Ladder(entry.label, (), "not_run", measured.reason, measured.reason)
+    run = processes.call(entry, _errors, scene, interval, 1, metrics)  # compiles and warms up before anything is timed
+    if isinstance(run, Breakdown):
+        return Ladder(entry.label, (), "not_run", run.reason, run.reason)
     for division in takewhile(lambda division: scene.duration * division / interval <= most, DIVISIONS):
-        measured = processes.call(entry, _errors, scene, interval / division, division, metrics)
-        if isinstance(measured, Breakdown):
+        run = processes.call(entry, _errors, scene, interval / division, division, metrics)
+        if isinstance(run, Breakdown):
             tried.append((interval / division, [math.nan] * len(metrics)))
-            ended, reason = "failed", measured.reason
+            ended, reason = "failed", run.reason
             break
-        tried.append((interval / division, measured[0]))
-        spent += measured[1]
+        tried.append((interval / division, run[0]))
+        spent += run[1]
         if stalled := _stalled([errors[0] for _, errors in tried if np.isfinite(errors[0])]):
             ended, reason = "error_stopped_falling", f"over the last {stalled} steps the error fell by less than a fifth per step"
             break

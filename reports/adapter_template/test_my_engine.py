@@ -10,8 +10,8 @@ import dropspin as ds
 
 def test_adapter_conforms() -> None:
     """What `dropspin conform my_engine:MyEngine` checks."""
-    found = ds.conform("my_engine:MyEngine")
-    failed = [f"{one.check}: {one.message}" for one in found if one.outcome not in ("passed", "noted", "declined")]
+    results = ds.conform("my_engine:MyEngine")
+    failed = [f"{result.check}: {result.message}" for result in results if result.outcome not in ("passed", "noted", "declined")]
     assert not failed, "\n".join(failed)
 
 

@@ -31,13 +31,13 @@ def calibrate_command(friction: str, language: str | None, json_output: bool, **
     if language is not None and json_output:
         raise click.UsageError("--as prints one text and --json prints all of them; give only one of these options.")
     with status(f"measuring {options['engine']}"):
-        found = calibrate(**options, friction=view.friction(friction))
+        result = calibrate(**options, friction=view.friction(friction))
     stop_if_interrupted()
     if language is not None:
-        if language not in found.programs:
-            raise UnknownName(f"{found.engine}'s language", language, found.programs)
-        echo(found.programs[language], nl=False)
+        if language not in result.programs:
+            raise UnknownName(f"{result.engine}'s language", language, result.programs)
+        echo(result.programs[language], nl=False)
         return
-    print_json_or(json_output, view.as_data(found), view.document(found))
-    for name, text in found.programs.items() if not json_output else ():
+    print_json_or(json_output, view.as_data(result), view.document(result))
+    for name, text in result.programs.items() if not json_output else ():
         echo(f"To paste, as {name}:\n\n{text}")

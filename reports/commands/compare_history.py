@@ -31,10 +31,10 @@ def compare_history_command(runs: tuple[str, ...], output: str, json_output: boo
 
     with study_folder(output) as folder:
         with status("reading the runs"):
-            found = history(_load_runs(runs))
+            results = history(_load_runs(runs))
         with status("drawing"):
-            document = write_history(found, folder)
-    print_json_or(json_output, rows(found), document, os.path.join(output, "history.md"))
+            document = write_history(results, folder)
+    print_json_or(json_output, rows(results), document, os.path.join(output, "history.md"))
 
 
 def _load_runs(places: tuple[str, ...]) -> "dict[str, Results]":

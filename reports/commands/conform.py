@@ -36,19 +36,19 @@ def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, 
     from dropspin.reports.terminal.rows import print_json_or, print_row
 
     chosen, console = present_entry(engine_name).adapter, Console()
-    found: list[CheckResult] = []
+    results: list[CheckResult] = []
 
     def show(result: "CheckResult") -> None:
         stop_if_interrupted()
         if not json_output:
-            print_row([result.check, result.outcome, view.message(result, found)], [max(map(len, CHECKS)), len("timed_out")], console)
+            print_row([result.check, result.outcome, view.message(result, results)], [max(map(len, CHECKS)), len("timed_out")], console)
             if traceback and result.traceback:
                 echo(result.traceback)
-        found.append(result)
+        results.append(result)
 
     echo(f"checking {chosen.label}", err=True)
     conform(chosen, checks, resources=resources, on_result=show)
     keys = ("check", "outcome", "message", *(["traceback"] if traceback else []))
-    print_json_or(json_output, [{key: getattr(result, key) for key in keys} for result in found], view.document(found))
-    outcomes = {result.outcome for result in found}
+    print_json_or(json_output, [{key: getattr(result, key) for key in keys} for result in results], view.document(results))
+    outcomes = {result.outcome for result in results}
     return 3 if outcomes & {"crashed", "timed_out"} else int("failed" in outcomes)

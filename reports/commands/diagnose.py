@@ -38,8 +38,8 @@ def diagnose_command(file: str, output: str, json_output: bool, **options: Any) 
 
     with study_folder(output) as folder:
         with share_bar(os.path.basename(file)) as on_progress:
-            found = diagnose(file, **options, on_progress=on_progress)
-        study = Diagnosed(diagnosis=found)
+            diagnosis = diagnose(file, **options, on_progress=on_progress)
+        study = Diagnosed(diagnosis=diagnosis)
         document = write_study_and_page(study, folder)
     print_json_or(json_output, study.rows(), document, os.path.join(output, "report.html"))
-    return int(found.failed)
+    return int(diagnosis.failed)

@@ -49,11 +49,11 @@ def limits_command(scenes: tuple[str, ...], axes: tuple[str, ...], output: str, 
     if len({scene.name for scene in loaded}) < len(loaded):
         raise click.UsageError("two scenes have the same name, which is that of the file; rename one of the files.")
     having = [scene for scene in loaded if all(AXES[name].applies(scene) for name in {*axes} & AXES.keys())]
-    found = []
+    results = []
     with study_folder(output) as folder:
         for scene in having or loaded[:1]:  # the error of find_limits lists the axes of a scene
             with share_bar(scene.name) as on_progress:
-                found.append(find_limits(scene, axes=axes, **options, on_progress=on_progress))
-        study = Limits(scenes=found)
+                results.append(find_limits(scene, axes=axes, **options, on_progress=on_progress))
+        study = Limits(scenes=results)
         document = write_study(study, folder)
     print_json_or(json_output, study.rows(), document, os.path.join(output, "limits.md"))

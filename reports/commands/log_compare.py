@@ -38,7 +38,7 @@ def log_compare_command(recording: str, fits: bool, output: str, json_output: bo
         with share_bar(recording) as on_progress:
             flights = flights_in(recording)
             fit = log_fit(flights, **options, on_progress=on_progress) if fits else None
-            found = log_compare(flights, fit=fit, **options, on_progress=on_progress)
-        study = ComparedLog(recording=recording, findings=list(log_check(flights).findings), comparison=found)
+            comparison = log_compare(flights, fit=fit, **options, on_progress=on_progress)
+        study = ComparedLog(recording=recording, findings=list(log_check(flights).findings), comparison=comparison)
         document = write_study_and_page(study, folder)
     print_json_or(json_output, study.rows(), document, os.path.join(output, "report.html"))

@@ -22,8 +22,8 @@ def record_publish_command(record: str, output: str) -> None:
     from dropspin.comparisons.results.folder import replaced_folder
     from dropspin.reports.html.record import INDEX, Site, files_of_site
 
-    found = read(record)
+    releases = read(record)
     docs = "../" if (Path(output).resolve().parent / "problems.html").is_file() else ""
     with replaced_folder(output, files_of_site, "record publish") as folder:
-        Site(found, others(record, found), docs).write(folder)
+        Site(releases, others(record, releases), docs).write(folder)
     echo(f"Site: {os.path.join(output, INDEX)}")

@@ -32,6 +32,6 @@ def record_rerun_command(engine: str, release: str, scene: str, folder: str, res
     from dropspin.reports.terminal.rows import print_json_or
 
     with status(f"installing {engine_name(engine)} {release}, and simulating {scene}"):
-        found = rerun(folder, load_plan(), engine, release, scene, time_limit=resources.processor_time)
-    print_json_or(json_output, view.as_data(found), view.document(found, scene))
-    return 1 if found.moved else 0
+        again = rerun(folder, load_plan(), engine, release, scene, time_limit=resources.processor_time)
+    print_json_or(json_output, view.as_data(again), view.document(again, scene))
+    return 1 if again.moved else 0

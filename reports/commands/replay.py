@@ -43,13 +43,13 @@ def replay_command(
     if output is None and file.is_symlink():  # the run may be somebody else's, and the link lead to any file
         raise DropspinError(f"{file}: is a link; delete it, or choose a file with -o.")
     results = load_results(Path(run))
-    found = [replay_of(results, name, dt) for name in scenes or results.scenes]
-    shown = [one for one in found if one is not None]
+    replays = (replay_of(results, name, dt) for name in scenes or results.scenes)
+    shown = [replay for replay in replays if replay is not None]
     if not shown:
         raise DropspinError(f"{run}: no engine completed a time step in these scenes; report.html has the reasons.")
     if gif is not None:
         if len(shown) > 1:
-            raise click.UsageError(f"a GIF shows one scene; name it: {', '.join(one.scene.name for one in shown)}.")
+            raise click.UsageError(f"a GIF shows one scene; name it: {', '.join(replay.scene.name for replay in shown)}.")
         with share_bar(gif) as progress:
 
             def on_progress(share: float) -> None:
@@ -60,9 +60,9 @@ def replay_command(
         echo(f"Written: {gif}")
         return
     charts = []
-    for one in shown:
-        at_this_step = {key: motion for key, motion in results.trajectories.items() if key[2] == one.dt}
-        charts.append(time_charts(replace(results, trajectories=at_this_step), one.scene.name))
+    for replay in shown:
+        at_this_step = {key: motion for key, motion in results.trajectories.items() if key[2] == replay.dt}
+        charts.append(time_charts(replace(results, trajectories=at_this_step), replay.scene.name))
     with written_whole(file) as unfinished:
         unfinished.write_text(replay_page(shown, charts), encoding="utf-8")
     echo(f"Written: {file}")

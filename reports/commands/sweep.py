@@ -38,9 +38,9 @@ def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, r
         with jobs_bar(asked.size) as on_progress:
             run_sweep(asked, output, resume=resume, scheduler=scheduler, resources=resources, on_progress=on_progress)
         stop_if_interrupted()
-        found = view.rows(output)
+        rows = view.rows(output)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"{count(output):,} of {asked.size:,} jobs are kept; --resume continues the sweep") from None
     written = f"{output}, {counted(asked.size, 'job')}; from Python: dropspin.read_sweep({output!r})"
-    print_json_or(json_output, found, view.document(found), written)
-    return view.exit_code(found)
+    print_json_or(json_output, rows, view.document(rows), written)
+    return view.exit_code(rows)

@@ -48,11 +48,11 @@ def tradeoff_command(scenes: tuple[str, ...], within: tuple[float, ...], output:
     from dropspin.reports.terminal.rows import print_json_or
     from dropspin.scenarios import load
 
-    loaded, found = [load(name) for name in scenes or ("spin-asymmetric",)], []
+    loaded, results = [load(name) for name in scenes or ("spin-asymmetric",)], []
     with study_folder(output) as folder:
         for scene in loaded:
             with share_bar(scene.name) as on_progress:
-                found.append(tradeoff(scene, **options, on_progress=on_progress))
-        study = TradeOffs(scenes=found, within=within)
+                results.append(tradeoff(scene, **options, on_progress=on_progress))
+        study = TradeOffs(scenes=results, within=within)
         document = write_study(study, folder)
     print_json_or(json_output, study.rows(), document, os.path.join(output, "tradeoff.md"))

@@ -108,9 +108,9 @@ def _in_box(wall: Wall, low: Array, high: Array) -> Array:
     heights = (corners - wall.point) @ np.array(wall.normal)
     edges = [(i, i | bit) for bit in (1, 2, 4) for i in range(8) if not i & bit]
     crossed = [(i, j) for i, j in edges if (heights[i] < 0.0) != (heights[j] < 0.0)]
-    found = np.array([(heights[i] * corners[j] - heights[j] * corners[i]) / (heights[i] - heights[j]) for i, j in crossed]).reshape(-1, 3)
-    x, _, z = rotate(wall.frame, found - found.mean(axis=0)).T if len(found) else np.empty((3, 0))
-    return found[np.argsort(np.arctan2(z, x))]
+    points = np.array([(heights[i] * corners[j] - heights[j] * corners[i]) / (heights[i] - heights[j]) for i, j in crossed]).reshape(-1, 3)
+    x, _, z = rotate(wall.frame, points - points.mean(axis=0)).T if len(points) else np.empty((3, 0))
+    return points[np.argsort(np.arctan2(z, x))]
 
 
 def _draw(axes: "Axes3D", shape: Outline, replay: Replay, motion: Motion, time: float) -> list[Any]:
@@ -124,13 +124,13 @@ def _draw(axes: "Axes3D", shape: Outline, replay: Replay, motion: Motion, time: 
     position, orientation = motion.frames.position[frame], motion.frames.orientation[frame]
     if not replay.in_sight(position[None])[0]:
         return []
-    own = shape.polygons(MERIDIANS)
-    faces = [_y_up(position + rotate(orientation, face)) for face in own]
+    local = shape.polygons(MERIDIANS)
+    faces = [_y_up(position + rotate(orientation, face)) for face in local]
     style: dict[str, Any] = {"facecolor": "none", "edgecolor": motion.colour or EXACT_COLOUR, "linestyle": "-" if motion.colour else "--"}
     if motion is replay.motions[0] and motion.colour:
         # As in the page, the face along the body's axis z is light.
-        marked = [] if shape.radius else [np.argmax([face[:, 2].min() for face in own])]
-        colours = np.tile(to_rgb(motion.colour), (len(own), 1))
+        marked = [] if shape.radius else [np.argmax([face[:, 2].min() for face in local])]
+        colours = np.tile(to_rgb(motion.colour), (len(local), 1))
         colours[marked] += MARK * (1.0 - colours[marked])
         style = {"facecolors": colours, "edgecolor": EXACT_COLOUR}
     trail = _y_up(np.vstack([motion.frames.position[motion.frames.t <= time], position]))

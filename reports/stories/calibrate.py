@@ -23,17 +23,17 @@ def friction(text: str) -> str | float:
         raise DropspinError(f"friction: got {text!r}; give none, infinite or a coefficient.") from None
 
 
-def document(found: Calibration) -> Document:
+def document(calibration: Calibration) -> Document:
     """The values that were measured with the calibrated settings; the settings and the reasons for them."""
-    measured = [{"measured": result.name, "value": _value(result), "how": result.how} for result in found.measured]
-    settings = [{"set": name, "to": str(value), "why": found.reasons.get(name, "")} for name, value in found.settings.items()]
-    return Document(found.engine, [Table(measured), Table(settings)])
+    measured = [{"measured": result.name, "value": _value(result), "how": result.how} for result in calibration.measured]
+    settings = [{"set": name, "to": str(value), "why": calibration.reasons.get(name, "")} for name, value in calibration.settings.items()]
+    return Document(calibration.engine, [Table(measured), Table(settings)])
 
 
 def _value(result: Measured) -> str:
     return "–" if math.isnan(result.value) else with_unit(f"{result.value:.4g}", result.unit)
 
 
-def as_data(found: Calibration) -> dict[str, Any]:
+def as_data(calibration: Calibration) -> dict[str, Any]:
     """A calibration for JSON."""
-    return {name: getattr(found, name) for name in ("engine", "measured", "settings", "programs")}
+    return {name: getattr(calibration, name) for name in ("engine", "measured", "settings", "programs")}

@@ -24,10 +24,10 @@ def worst_contacts(results: Results, scene_name: str) -> list[dict[str, str]]:
     for engine in results.engines:
         motion = next((mine[key] for key in sorted(mine, key=lambda key: key[1]) if key[0] == engine), None)
         sound = None if motion is None else motion[: motion.first_bad_row]
-        found = None if sound is None or len(sound) < 2 else contacts(scene, sound)
-        if found is not None and len(found):
-            worst = {name: _worst(found[name].tolist(), found["start"].tolist()) for name in RESIDUALS}
-            rows.append({"engine": engine, "contacts": str(len(found)), **worst})
+        table = None if sound is None or len(sound) < 2 else contacts(scene, sound)
+        if table is not None and len(table):
+            worst = {name: _worst(table[name].tolist(), table["start"].tolist()) for name in RESIDUALS}
+            rows.append({"engine": engine, "contacts": str(len(table)), **worst})
     return rows
 
 

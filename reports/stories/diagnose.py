@@ -37,13 +37,13 @@ class Diagnosed(Study):
 
     def rows(self) -> list[dict[str, Any]]:
         """Every answer, once for each of its findings, with where the settings are written."""
-        found = []
+        rows = []
         for body in self.diagnosis.bodies:
             of_body = {"file": self.diagnosis.file, "body": body.name, "engine": body.engine, "version": body.version, "dt": body.dt}
             for answer in body.answers:
                 values = {name: value for name, value in asdict(answer).items() if name != "findings"}
-                found += [{**of_body, **values, **_finding_cells(body, answer, finding)} for finding in answer.findings or [None]]
-        return found
+                rows += [{**of_body, **values, **_finding_cells(body, answer, finding)} for finding in answer.findings or [None]]
+        return rows
 
     def document(self) -> Document:
         """The answers of one body, or a table of several; what differs between engines; and the findings."""
@@ -82,8 +82,8 @@ def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
         return [Paragraph(f"{body.name}: {body.breakdown.removesuffix('.')}.", style="bold", on_terminal=on_terminal)]
     others = f" (or {listed(body.others)}, by --on)" if body.others else ""
     lands = f"; lands on {body.surface}{others}, friction {body.friction:g}" if body.surface else "; lands on nothing"
-    what = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg"
-    head = f"{what}; {body.engine} {body.version}, time step {in_ms(body.dt)}{lands}."
+    described = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg"
+    head = f"{described}; {body.engine} {body.version}, time step {in_ms(body.dt)}{lands}."
     drawn = charts(body)
     return [
         Heading(f"{body.name} in {body.engine}"),
@@ -112,13 +112,13 @@ def of_several(bodies: Sequence[BodyDiagnosis]) -> list[str]:
 
 def _overview(body: BodyDiagnosis) -> dict[str, str]:
     kinds = [_kind(finding) for _, finding in body.findings]
-    found = ", ".join(f"{kind} ({kinds.count(kind)})" if kinds.count(kind) > 1 else kind for kind in dict.fromkeys(kinds))
+    findings = ", ".join(f"{kind} ({kinds.count(kind)})" if kinds.count(kind) > 1 else kind for kind in dict.fromkeys(kinds))
     return {
         "body": body.name,
         "engine": body.engine,
         "mass": f"{body.mass:.3g} kg",
         "lands on": body.surface or "–",
-        "findings": body.breakdown or found or "none",
+        "findings": body.breakdown or findings or "none",
     }
 
 
@@ -167,38 +167,38 @@ def _value(value: float, unit: str) -> str:
 
 def sentences(body: BodyDiagnosis) -> list[str]:
     """A sentence for each finding: what is wrong, the settings in the words of the file with their lines, and the remedy that was tried."""
-    found = []
+    lines = []
     for same in grouped(body.findings, _shared).values():
         question, finding = same[0][0].question, same[0][1]
         stated = grouped(same, _statement).items()
-        what = "; ".join(f"{_together([answer for answer, _ in those])} {statement}" for statement, those in stated)
+        statements = "; ".join(f"{_together([answer for answer, _ in those])} {statement}" for statement, those in stated)
         where = ", ".join(_settings(body, finding))
-        sentence = f"{question.capitalize()}, {_kind(finding)}: {what}" + (f": {where}." if where else ".")
-        found.append(" ".join([sentence, *_remedies(*same)]))
-    return found
+        sentence = f"{question.capitalize()}, {_kind(finding)}: {statements}" + (f": {where}." if where else ".")
+        lines.append(" ".join([sentence, *_remedies(*same)]))
+    return lines
 
 
-def _shared(found: tuple[Answer, Finding]) -> tuple[object, ...]:
+def _shared(pair: tuple[Answer, Finding]) -> tuple[object, ...]:
     """What findings that one sentence names together have in common."""
-    answer, finding = found
+    answer, finding = pair
     return answer.question, finding.kind, finding.settings, tuple(remedy.text for remedy in finding.remedies)
 
 
 def _together(answers: Sequence[Answer]) -> str:
     """The quantities of answers, those that differ in the speed or the direction of the start as one."""
-    found = []
+    quantities = []
     for quantity, same in grouped(answers, lambda answer: answer.quantity).items():
         from_speed, along = STARTS.get(same[0].question, (" at", " about"))
         speeds = dict.fromkeys(f"{answer.speed:g}" for answer in same if math.isfinite(answer.speed))
         directions = dict.fromkeys(answer.direction for answer in same if answer.direction)
         of_speeds = f"{from_speed} {', '.join(speeds)} m/s" if speeds else ""
-        found.append(quantity + of_speeds + (f"{along} {', '.join(directions)}" if directions else ""))
-    return ", ".join(found)
+        quantities.append(quantity + of_speeds + (f"{along} {', '.join(directions)}" if directions else ""))
+    return ", ".join(quantities)
 
 
 def _remedies(*same: tuple[Answer, Finding]) -> list[str]:
     """A sentence for each remedy of equal findings, with the values measured with it."""
-    found = []
+    lines = []
     for remedies in zip(*(finding.remedies for _, finding in same), strict=True):
         pairs = zip(remedies, (answer for answer, _ in same), strict=True)
         values = {_value_after(remedy, answer): None for remedy, answer in pairs}
@@ -207,9 +207,9 @@ def _remedies(*same: tuple[Answer, Finding]) -> list[str]:
         if first.others or not first.runs:
             others, runs = counted(first.others, "other body", "other bodies"), "runs" if first.runs else "breaks down"
             text += f" (it applies to {others} too, and the whole model {runs} with it)"
-        found.append(f"{text}.")
+        lines.append(f"{text}.")
 
-    return found
+    return lines
 
 
 def _value_after(remedy: Remedy, answer: Answer) -> str:
@@ -218,9 +218,9 @@ def _value_after(remedy: Remedy, answer: Answer) -> str:
     return value if remedy.unit == answer.unit else f"a fraction of {value} kept in 1 s"
 
 
-def _statement(found: tuple[Answer, Finding]) -> str:
+def _statement(pair: tuple[Answer, Finding]) -> str:
     """What a sentence states of a quantity."""
-    answer, finding = found
+    answer, finding = pair
     measured, in_force, physical = _cells(answer)
     if finding.kind == "impossible":
         return f"is {measured}, but {finding.detail}"
@@ -240,11 +240,11 @@ def differences(bodies: Sequence[BodyDiagnosis]) -> list[dict[str, str]]:
     """The answers in which engines differ, a column for each."""
     by_quantity: dict[str, dict[str, str]] = {}
     for body in bodies:
-        for answer in (one for one in body.answers if one.question != "file"):
+        for answer in (answer for answer in body.answers if answer.question != "file"):
             row = by_quantity.setdefault(f"{answer.question}: {_together([answer])}", {})
             row[f"{body.engine}, dt = {in_ms(body.dt)}"] = _cells(answer)[0] or _value(answer.in_force, answer.unit)
     engines = [f"{body.engine}, dt = {in_ms(body.dt)}" for body in bodies]
-    rows = [{"what": what, **{engine: row.get(engine, "–") for engine in engines}} for what, row in by_quantity.items()]
+    rows = [{"what": quantity, **{engine: row.get(engine, "–") for engine in engines}} for quantity, row in by_quantity.items()]
     return [row for row in rows if len({row[engine] for engine in engines}) > 1]
 
 

@@ -15,21 +15,21 @@ Rows = list[dict[str, str]]
 
 def rows(engines: Sequence[str]) -> Rows:
     """Versions, processor, and whether each engine can take a time step."""
-    found = [{"what": package, "found": version or "not installed"} for package, version in versions().items()]
-    found += [{"what": "python", "found": sys.version.split()[0]}, {"what": "processor", "found": processor()}]
+    facts = [{"what": package, "found": version or "not installed"} for package, version in versions().items()]
+    facts += [{"what": "python", "found": sys.version.split()[0]}, {"what": "processor", "found": processor()}]
     with EngineProcesses(ResourceLimits(processor_time=60.0)) as processes:
-        found += [{"what": f"engine {name}", "found": _health(name, processes)} for name in engines]
-    return found
+        facts += [{"what": f"engine {name}", "found": _health(name, processes)} for name in engines]
+    return facts
 
 
 def _health(name: str, processes: EngineProcesses) -> str:
     """Whether an engine can take a time step, tried in a separate process."""
     try:
         entry = engine_entry(name)
-        found = processes.call(entry, _fall)
+        answer = processes.call(entry, _fall)
     except DropspinError as error:
         return f"broken: {error}"
-    return f"{entry.absence or 'broken'}: {found}" if isinstance(found, Breakdown) else found
+    return f"{entry.absence or 'broken'}: {answer}" if isinstance(answer, Breakdown) else answer
 
 
 def _fall(entry: EngineEntry) -> str:

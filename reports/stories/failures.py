@@ -102,9 +102,9 @@ def failure_parts(results: Results, failures: Sequence[Failure], baseline: str |
     """
     broken = {(failure.scene, failure.engine) for failure in failures if failure.broke_down}
     # Accepted results of an engine that broke down are gone because it broke down.
-    own = [one for one in failures if one.result or not one.accepted or (one.scene, one.engine) not in broken]
+    shown = [failure for failure in failures if failure.result or not failure.accepted or (failure.scene, failure.engine) not in broken]
     parts: list[Part] = []
-    for engine, of_engine in grouped(own, attrgetter("engine")).items():
+    for engine, of_engine in grouped(shown, attrgetter("engine")).items():
         by_cause = grouped(of_engine, lambda failure: (failure.broke_down, failure.what if failure.broke_down else failure.scene))
         explained = _consistent_with(results, engine) + settings_that_explain(results, engine)
         sentences = [f"✗ {_of_one_cause(alike)}" for alike in by_cause.values()]
@@ -132,25 +132,25 @@ def settings_that_explain(results: Results, engine: str) -> list[str]:
     """A sentence for each error that changed settings of an engine explain, and for all scenes in which they are the same."""
     mine = results.table[(results.table["kind"] == "setting") & (results.table["engine"] == engine)].to_dict("records")
     by_scene = grouped(mine, itemgetter("scene", "metric", "dt"))
-    alike = grouped(by_scene.items(), lambda one: (one[0][1], *(row["truth"] for row in one[1])))
+    alike = grouped(by_scene.items(), lambda item: (item[0][1], *(row["truth"] for row in item[1])))
     sentences = []
     for ((scene, metric, dt), rows), *others in alike.values():
         also = f"; the same settings in {listed([where for (where, *_), _ in others])}" if others else ""
-        what = f"of the {subject(metric, 'truth', '')} at {in_ms(dt)}"
-        sentences.append(f"{scene}: {_with_shares(rows, what)}{also}.")
+        error = f"of the {subject(metric, 'truth', '')} at {in_ms(dt)}"
+        sentences.append(f"{scene}: {_with_shares(rows, error)}{also}.")
     return sentences
 
 
-def _with_shares(rows: Sequence[Row], what: str) -> str:
+def _with_shares(rows: Sequence[Row], error: str) -> str:
     """The settings that explain an error, with their shares of it."""
     names = [str(row["truth"]).replace(", ", " and ") for row in rows]
     sizes = [f"{rounded(100.0 * row['value'], 3)} %" for row in rows]
     explain = "explain" if ", " in rows[0]["truth"] else "explains"
     if sum(row["value"] for row in rows) > SEVERAL:
-        return f"either {', or '.join(names)} {explain} {sizes[0]} {what}"
+        return f"either {', or '.join(names)} {explain} {sizes[0]} {error}"
     if explain == "explain":
-        return f"{names[0]} explain {sizes[0]} {what}, but only together"
-    return f"{names[0]} explains {sizes[0]} {what}" + "".join(
+        return f"{names[0]} explain {sizes[0]} {error}, but only together"
+    return f"{names[0]} explains {sizes[0]} {error}" + "".join(
         f", and {name} {size}" for name, size in zip(names[1:], sizes[1:], strict=True)
     )
 
@@ -181,13 +181,13 @@ def what_fails(row: Row) -> str:
     """A failed row in words: value, bound or interval, and reason."""
     if not row["metric"]:
         return str(row["reason"]) if row["verdict"] in FAILURES else f"{word(row['verdict'])}. {row['reason']}"
-    what = subject(row["metric"], row["kind"], row["truth"])
+    name = subject(row["metric"], row["kind"], row["truth"])
     if row["kind"] == "baseline":  # with more digits than elsewhere: tolerances are small
-        return f"{what} is {row['value']:.6g}, {row['reason']}"
+        return f"{name} is {row['value']:.6g}, {row['reason']}"
     limits = bound(row["lower"], row["upper"])
     expected = f", {'95 % interval' if row['kind'] in STUDIES else 'expected'} {limits}" if limits else ""
     value = "undefined" if math.isnan(row["value"]) else formatted(row["value"])
-    return f"{what} is {value}{expected}: {row['reason']}"
+    return f"{name} is {value}{expected}: {row['reason']}"
 
 
 def reproduce(results: Results, row: Row, baseline: str | None = None) -> str:

@@ -18,10 +18,10 @@ def law_rows(results: Results) -> list[dict[str, str]]:
     for _, distances in others.groupby(["scene", "engine"], sort=False):
         case = distances.iloc[:1][["scene", "engine", "dt", "metric", "unit"]]
         [first] = case.to_dict("records")
-        own = law_of(results.scenes[first["scene"]])
+        in_force = law_of(results.scenes[first["scene"]])
         sizes = dict(zip(distances["truth"], distances["value"].abs(), strict=True))
-        sizes |= dict.fromkeys([str(own)], float(results.measurements.merge(case)["value"].abs().max()))
-        cells = {str(law): f"{formatted(sizes[law])}{' *' * (law == own)}" if law in sizes else "–" for law in FRICTION_LAWS}
+        sizes |= dict.fromkeys([str(in_force)], float(results.measurements.merge(case)["value"].abs().max()))
+        cells = {str(law): f"{formatted(sizes[law])}{' *' * (law == in_force)}" if law in sizes else "–" for law in FRICTION_LAWS}
         distance = f"{quantity(first['metric'])}{unit(first['unit'])} at {in_ms(first['dt'])}"
         rows.append({"scene": first["scene"], "engine": first["engine"], "distance": distance, **cells})
     return rows

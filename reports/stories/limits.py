@@ -27,36 +27,36 @@ class Limits(Study):
 
     def rows(self) -> list[dict[str, Any]]:
         """Every tested value, and a row for each engine that is missing."""
-        return [row for found in self.scenes for row in _rows(found)]
+        return [row for study in self.scenes for row in _rows(study)]
 
     def document(self) -> Document:
         """The ranges in each scene; and the largest time steps."""
         parts: list[Part] = []
-        for found in self.scenes:
-            charts = [Charts(found.scene.name, limits_charts(found))] if found.scans else []
-            parts += [Heading(found.scene.name), Paragraph(nominal(found)), *charts, Table(range_rows(found))]
-            parts.append(Sentences(sentences(found), numbered=True))
+        for study in self.scenes:
+            charts = [Charts(study.scene.name, limits_charts(study))] if study.scans else []
+            parts += [Heading(study.scene.name), Paragraph(nominal(study)), *charts, Table(range_rows(study))]
+            parts.append(Sentences(sentences(study), numbered=True))
         steps = step_rows(self.scenes)
         summary: list[Part] = [Heading("The largest steps"), Table(steps), Paragraph(ACCURATE_AND_STABLE)] if steps else []
         return Document("Where engines break down", parts, summary)
 
 
-def _rows(found: RobustnessStudy) -> list[dict[str, Any]]:
+def _rows(study: RobustnessStudy) -> list[dict[str, Any]]:
     """Every tested value of every scan, the smaller time steps tried at the nominal values, and a row for each engine left out."""
-    name, scanned = found.scene.name, {scan.engine for scan in found.scans if scan.axis.name == "step"}
-    points = [(scan.engine, scan.axis, point) for scan in found.scans for point in scan.points]
-    not_scanned = [engine for engine in found.refinements if engine not in scanned]
-    points += [(engine, AXES["step"], point) for engine in not_scanned for point in found.steps(engine)]
+    name, scanned = study.scene.name, {scan.engine for scan in study.scans if scan.axis.name == "step"}
+    points = [(scan.engine, scan.axis, point) for scan in study.scans for point in scan.points]
+    not_scanned = [engine for engine in study.refinements if engine not in scanned]
+    points += [(engine, AXES["step"], point) for engine in not_scanned for point in study.steps(engine)]
     tested = [(name, engine, axis.name, point.value, axis.unit, *point.diagnosis) for engine, axis, point in points]
-    missing = [(name, engine, None, None, None, "missing", None, None, reason) for engine, reason in found.left_out.items()]
+    missing = [(name, engine, None, None, None, "missing", None, None, reason) for engine, reason in study.left_out.items()]
     return [dict(zip(COLUMNS, row, strict=True)) for row in [*tested, *missing]]
 
 
-def nominal(found: RobustnessStudy) -> str:
+def nominal(study: RobustnessStudy) -> str:
     """The conditions of a study: scene, time step and tolerance. An axis may vary the time step."""
     return (
-        f"{found.scene.name} at dt = {duration(found.dt)}. "
-        f"Sound: the engine does not fail, and its errors are at most {found.within:g} (ratios, and angles in rad)."
+        f"{study.scene.name} at dt = {duration(study.dt)}. "
+        f"Sound: the engine does not fail, and its errors are at most {study.within:g} (ratios, and angles in rad)."
     )
 
 
@@ -84,10 +84,10 @@ def _mode(point: ScanPoint) -> str:
     return point.mode.replace("_", " ")
 
 
-def range_rows(found: RobustnessStudy) -> list[dict[str, str]]:
+def range_rows(study: RobustnessStudy) -> list[dict[str, str]]:
     """The range in which each engine is sound along each axis, and the failure modes beyond."""
-    modes = {engine: _mode(points[0]) for engine, points in found.refinements.items() if points[0].mode != "sound"}
-    return [{"axis": scan.axis.label, "engine": scan.engine, **_range(scan, modes.get(scan.engine))} for scan in found.scans]
+    modes = {engine: _mode(points[0]) for engine, points in study.refinements.items() if points[0].mode != "sound"}
+    return [{"axis": scan.axis.label, "engine": scan.engine, **_range(scan, modes.get(scan.engine))} for scan in study.scans]
 
 
 def _range(scan: AxisScan, nominal: str | None) -> dict[str, str]:
@@ -111,10 +111,10 @@ def _range(scan: AxisScan, nominal: str | None) -> dict[str, str]:
     return {"sound from": least, "to": most, "beyond": "; ".join(outside)}
 
 
-def sentences(found: RobustnessStudy) -> list[str]:
+def sentences(study: RobustnessStudy) -> list[str]:
     """Sentences on engines that are not sound at the nominal values, with their errors, and on engines left out."""
-    failing = [(engine, points) for engine, points in found.refinements.items() if points[0].mode != "sound"]
-    return [_refinement(engine, points) for engine, points in failing] + left_out(found.left_out)
+    failing = [(engine, points) for engine, points in study.refinements.items() if points[0].mode != "sound"]
+    return [_refinement(engine, points) for engine, points in failing] + left_out(study.left_out)
 
 
 def _refinement(engine: str, points: Sequence[ScanPoint]) -> str:

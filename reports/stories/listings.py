@@ -36,12 +36,12 @@ def engine_rows() -> Rows:
             installed = "no" if entry.absence == "missing" else entry.absence
             rows.append({"engine": name, "installed": installed, "summary": absence(name) or entry.reason, "options": ""})
             continue
-        found = entry.adapter
-        choices = [f"{key} = {' | '.join(values)}" for key, values in found.choices.items()]
-        numbers = [f"{key} = {allowed.least:g} … {allowed.most:g}" for key, allowed in found.numbers.items()]
-        settings = [f"{len(found.settings)} settings: dropspin show {name}"] if found.settings else []
+        adapter = entry.adapter
+        choices = [f"{key} = {' | '.join(values)}" for key, values in adapter.choices.items()]
+        numbers = [f"{key} = {allowed.least:g} … {allowed.most:g}" for key, allowed in adapter.numbers.items()]
+        settings = [f"{len(adapter.settings)} settings: dropspin show {name}"] if adapter.settings else []
         options = "; ".join(choices + numbers + settings)
-        summary = found.traits.summary if isinstance(found, StandIn) else (type(found).__doc__ or "").strip().partition("\n")[0]
+        summary = adapter.traits.summary if isinstance(adapter, StandIn) else (type(adapter).__doc__ or "").strip().partition("\n")[0]
         rows.append({"engine": name, "installed": "yes", "summary": summary, "options": options})
     return rows
 

@@ -40,30 +40,30 @@ class ComparedLog(Study):
 
     def rows(self) -> list[dict[str, Any]]:
         """Every error, difference, group and part, and a row for each engine left out."""
-        found = self.comparison
-        rows = [{"row": part, **asdict(row)} for part in ("errors", "pairs", "parts") for row in getattr(found, part)]
-        rows += [{"row": "groups", "quantity": quantity, "engines": group} for quantity, groups in found.groups.items() for group in groups]
-        return with_all_columns(rows, found.left_out)
+        study = self.comparison
+        rows = [{"row": part, **asdict(row)} for part in ("errors", "pairs", "parts") for row in getattr(study, part)]
+        rows += [{"row": "groups", "quantity": quantity, "engines": group} for quantity, groups in study.groups.items() for group in groups]
+        return with_all_columns(rows, study.left_out)
 
     def document(self) -> Document:
         """The errors, the groups, the differences and the parts."""
-        found, parts = self.comparison, list[Part]()
-        if found.errors:
+        study, parts = self.comparison, list[Part]()
+        if study.errors:
             parts += [
-                Table(_error_rows(found.errors), left_out_first=["at impact", "0.1 s later"]),
-                Paragraph(LEGEND.format(tosses=found.tosses, length=1e3 * found.length)),
-                Charts("errors", [_error_chart(quantity, found.errors) for quantity in OF]),
+                Table(_error_rows(study.errors), left_out_first=["at impact", "0.1 s later"]),
+                Paragraph(LEGEND.format(tosses=study.tosses, length=1e3 * study.length)),
+                Charts("errors", [_error_chart(quantity, study.errors) for quantity in OF]),
             ]
-        if found.pairs:
+        if study.pairs:
             parts += [
                 Heading("Differences between engines", on_terminal=True),
-                Table([_pair_row(pair) for pair in found.pairs]),
-                Charts("differences", [_pair_chart(quantity, found.pairs) for quantity in OF]),
+                Table([_pair_row(pair) for pair in study.pairs]),
+                Charts("differences", [_pair_chart(quantity, study.pairs) for quantity in OF]),
             ]
-        parts.append(Sentences([*_group_sentences(found), *left_out(found.left_out)]))
-        if found.parts:
+        parts.append(Sentences([*_group_sentences(study), *left_out(study.left_out)]))
+        if study.parts:
             heading = Heading("Parts of the mean errors over the motion", on_terminal=True)
-            parts += [heading, Table(_part_rows(found)), Paragraph(IMPROVED)]
+            parts += [heading, Table(_part_rows(study)), Paragraph(IMPROVED)]
         return Document(
             f"Engines compared with {self.recording}", parts, [Sentences(corrections(self.recording, self.findings), style="bold")]
         )
@@ -120,23 +120,23 @@ def _pair_row(pair: Pair) -> dict[str, str]:
     }
 
 
-def _group_sentences(found: LogComparison) -> list[str]:
+def _group_sentences(study: LogComparison) -> list[str]:
     """The groups by quantity, and what they mean."""
     sentences = [
         f"By {quantity}, these tosses do not tell apart: {'; '.join(' and '.join(group) for group in groups if len(group) > 1)}."
-        for quantity, groups in found.groups.items()
+        for quantity, groups in study.groups.items()
         if any(len(group) > 1 for group in groups)
     ]
     meaning = (
         "The intervals of the differences hold for all pairs at once. Within a group there is no order; an engine may be in two groups, "
         "whose other members differ."
     )
-    return [*sentences, meaning] if found.pairs else []
+    return [*sentences, meaning] if study.pairs else []
 
 
-def _part_rows(found: LogComparison) -> list[dict[str, str]]:
+def _part_rows(study: LogComparison) -> list[dict[str, str]]:
     rows = []
-    for (engine, quantity), parts in grouped(found.parts, lambda part: (part.engine, part.quantity)).items():
+    for (engine, quantity), parts in grouped(study.parts, lambda part: (part.engine, part.quantity)).items():
         scale, unit = OF[quantity]
         cells = {part.part: interval(scale * part.value, scale * part.lower, scale * part.upper) for part in parts}
         rows.append({"engine": engine, "error": quantity + unit, **cells})

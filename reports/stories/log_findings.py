@@ -79,26 +79,26 @@ SEPARATED_BY = {
 
 def sentence(finding: Finding) -> str:
     """What was found, its causes, what shows or separates them, and the remedy."""
-    given, several = _given(finding), len(finding.causes) > 1
+    values, several = _values(finding), len(finding.causes) > 1
     is_shown = math.isfinite(finding.value if finding.kind == "quaternion" else finding.rests)
     by = SEPARATED_BY if several else SHOWN_BY if is_shown else {}
     parts = {
         ": either " if several else ": ": ", or ".join(filter(None, map(_words, finding.causes))),
-        ". Separated by: " if several else ". Shown by: ": by.get(finding.kind, "").format_map(given),
+        ". Separated by: " if several else ". Shown by: ": by.get(finding.kind, "").format_map(values),
         ". Remedy: ": remedy(finding),
     }
-    found = "".join(name + text for name, text in parts.items() if text)
-    return capitalized(f"{KINDS[finding.kind].format_map(given)}{found}.")
+    rest = "".join(name + text for name, text in parts.items() if text)
+    return capitalized(f"{KINDS[finding.kind].format_map(values)}{rest}.")
 
 
 def remedy(finding: Finding) -> str:
     """What removes a finding, for each of its causes; empty if it needs no remedy."""
-    given = _given(finding)
-    remedies = [_remedy(cause, given) for cause in finding.causes] or [REMEDIES.get(finding.kind, "")]
+    values = _values(finding)
+    remedies = [_remedy(cause, values) for cause in finding.causes] or [REMEDIES.get(finding.kind, "")]
     return ", or ".join(filter(None, remedies))
 
 
-def _given(finding: Finding) -> dict[str, Any]:
+def _values(finding: Finding) -> dict[str, Any]:
     """The columns of a finding, with its numbers in other units."""
     value, expected = finding.value, finding.expected
     numbers = {"mm": 1e3 * value, "ms": 1e3 * value, "expected_ms": 1e3 * expected, "rests_mm": 1e3 * finding.rests}
@@ -108,12 +108,12 @@ def _given(finding: Finding) -> dict[str, Any]:
 
 def corrections(recording: str, findings: Iterable[Finding]) -> list[str]:
     """What to correct in the header before engines are compared with a recording."""
-    found = [sentence(finding) for finding in findings if any(cause.keys for cause in finding.causes)]
-    if found:
-        found.append(
+    sentences = [sentence(finding) for finding in findings if any(cause.keys for cause in finding.causes)]
+    if sentences:
+        sentences.append(
             f"Correct the header first: dropspin log check {recording} writes corrected.toml, with each remedy that has no alternative."
         )
-    return found
+    return sentences
 
 
 def _words(cause: Cause) -> str:
@@ -125,10 +125,10 @@ def _words(cause: Cause) -> str:
     return text.format(key=key, ratio=1.0 + cause.share, percent=100.0 * abs(cause.share))
 
 
-def _remedy(cause: Cause, given: dict[str, Any]) -> str:
+def _remedy(cause: Cause, values: dict[str, Any]) -> str:
     """The keys of the header that remove a cause, or what else does."""
     if not cause.keys:
-        return REMEDIES.get(cause.name, "").format_map(given | {"ratio": 1.0 + cause.share})
+        return REMEDIES.get(cause.name, "").format_map(values | {"ratio": 1.0 + cause.share})
     names = {key: f"[body] {key.removeprefix('body.')}" if key.startswith("body.") else key for key in cause.keys}
     return ", ".join(f"{name} = {_toml(cause.keys[key])}" for key, name in names.items())
 

@@ -41,8 +41,8 @@ class FittedLog(Study):
     def rows(self) -> list[dict[str, Any]]:
         """Every estimate, every difference between two engines, and a row for each engine left out."""
         fit, estimates = self.fit, [*self.fit.estimates, *([self.fit.friction] if self.fit.friction else [])]
-        rows = [{"row": "estimates", **asdict(one), "discrepancy": fit.discrepancies.get(one.engine)} for one in estimates]
-        rows += [{"row": "transfers", **asdict(one)} for one in fit.transfers]
+        rows = [{"row": "estimates", **asdict(row), "discrepancy": fit.discrepancies.get(row.engine)} for row in estimates]
+        rows += [{"row": "transfers", **asdict(row)} for row in fit.transfers]
         return with_all_columns(rows, fit.left_out)
 
     def document(self) -> Document:
@@ -59,13 +59,13 @@ class FittedLog(Study):
             "interval of an engine is for this engine alone; that of any engine contains the differences between engines."
         )
         unknown = [
-            f"{one.parameter.capitalize()} is not identified with {one.engine}: {NOT_IDENTIFIED[one.parameter]}."
-            for one in fit.estimates
-            if not one.has_lower and not one.has_upper
+            f"{row.parameter.capitalize()} is not identified with {row.engine}: {NOT_IDENTIFIED[row.parameter]}."
+            for row in fit.estimates
+            if not row.has_lower and not row.has_upper
         ]
         charts = [
-            interval_rows(parameter, [Interval(one.engine, one.value, one.lower, one.upper) for one in of_one])
-            for parameter, of_one in grouped(fit.estimates, lambda estimate: estimate.parameter).items()
+            interval_rows(parameter, [Interval(row.engine, row.value, row.lower, row.upper) for row in alike])
+            for parameter, alike in grouped(fit.estimates, lambda estimate: estimate.parameter).items()
         ]
         sentences = [legend, *unknown, *map(transfer, fit.transfers), *left_out(fit.left_out)]
         return Document(
@@ -85,10 +85,10 @@ def interval(estimate: Estimate) -> str:
     return "not identified"
 
 
-def transfer(found: Transfer) -> str:
+def transfer(pair: Transfer) -> str:
     """Whether the value of a parameter with one engine is that with another."""
-    statement = TRANSFERS[found.parameter][found.verdict].format(first=found.first, second=found.second)
+    statement = TRANSFERS[pair.parameter][pair.verdict].format(first=pair.first, second=pair.second)
     return (
-        f"{statement}. {found.first} needs {abs(found.difference):.3f} {'more' if found.difference > 0.0 else 'less'} (95 % interval of "
-        f"the difference {found.lower:.3f} to {found.upper:.3f}; equal is up to {EQUAL})."
+        f"{statement}. {pair.first} needs {abs(pair.difference):.3f} {'more' if pair.difference > 0.0 else 'less'} (95 % interval of "
+        f"the difference {pair.lower:.3f} to {pair.upper:.3f}; equal is up to {EQUAL})."
     )

@@ -74,9 +74,9 @@ def mean_cost(release: Release, label: str, dt: float, *, with_floor: bool) -> s
 
 def remarks(cases: Mapping[str, Case]) -> list[str]:
     """Why there is no result, or which limitation is known: a sentence for all names, of scenes or labels, that have the same."""
-    found = grouped([name for name, case in cases.items() if case.reason], lambda name: (cases[name].verdict, cases[name].reason))
-    words = {verdict: "known limitation" if verdict == "measured" else word(verdict) for verdict, _ in found}
-    return [f"{', '.join(names)}: {words[verdict]}: {reason}" for (verdict, reason), names in found.items()]
+    alike = grouped([name for name, case in cases.items() if case.reason], lambda name: (cases[name].verdict, cases[name].reason))
+    words = {verdict: "known limitation" if verdict == "measured" else word(verdict) for verdict, _ in alike}
+    return [f"{', '.join(names)}: {words[verdict]}: {reason}" for (verdict, reason), names in alike.items()]
 
 
 def change_sentences(changed: Sequence[Change]) -> dict[str, list[str]]:
@@ -84,7 +84,7 @@ def change_sentences(changed: Sequence[Change]) -> dict[str, list[str]]:
 
     Labels and scenes that changed alike have one sentence; scenes with values in one of the releases only come last.
     """
-    shown = [_shown(found) for found in grouped(changed, lambda change: (change.release, change.label, change.scene)).values()]
+    shown = [_shown(changes) for changes in grouped(changed, lambda change: (change.release, change.label, change.scene)).values()]
     ordered = sorted(shown, key=lambda change: -_gained(change))
     sentences: dict[str, list[str]] = {change.release: [] for change in reversed(changed)}
     by_label = grouped(ordered, lambda change: (change.release, change.label, _words(change)))
@@ -94,9 +94,10 @@ def change_sentences(changed: Sequence[Change]) -> dict[str, list[str]]:
     return sentences
 
 
-def _shown(found: Sequence[Change]) -> Change:
+def _shown(changes: Sequence[Change]) -> Change:
     """The change of a scene at the finest time step: of its leading error, else of the metric that changed most."""
-    finest = [change for change in found if change.dt == min(one.dt for one in found)]
+    least = min(change.dt for change in changes)
+    finest = [change for change in changes if change.dt == least]
     return next((change for change in finest if change.metric == leading(change.scene)), finest[0])
 
 
@@ -124,9 +125,9 @@ def summary(release: Release, label: str, dt: float) -> list[str]:
     cases = release.at(label, dt)
 
     def group(scene: str) -> str:
-        found, verdict = digits(relative_error(cases[scene], scene)), cases[scene].verdict
+        count, verdict = digits(relative_error(cases[scene], scene)), cases[scene].verdict
         without = "too coarse" if verdict == "measured" else word(verdict)  # as in `cell`
-        return next((words for words, least in GROUPS.items() if found >= least), without)
+        return next((words for words, least in GROUPS.items() if count >= least), without)
 
     groups = grouped(cases, group)
     return [f"{words}: {', '.join(groups[words])}" for words in dict.fromkeys([*GROUPS, *groups]) if words in groups]
@@ -143,6 +144,6 @@ def changes_in_words(changed: Sequence[Change]) -> str:
 def badge(engine: str, release: Release, label: str, dt: float) -> dict[str, Any]:
     """The badge of an engine, as shields.io reads it: https://shields.io/badges/endpoint-badge."""
     errors = [relative_error(case, scene) for scene, case in release.at(label, dt).items()]
-    found = [digits(error) for error in errors if not math.isnan(error)]
-    message = f"median {np.median(found):.1f} digits in {len(found)} of {len(errors)} scenes" if found else "no scene"
-    return {"schemaVersion": 1, "label": f"{engine} {release.name}", "message": message, "color": "blue" if found else "lightgrey"}
+    known = [digits(error) for error in errors if not math.isnan(error)]
+    message = f"median {np.median(known):.1f} digits in {len(known)} of {len(errors)} scenes" if known else "no scene"
+    return {"schemaVersion": 1, "label": f"{engine} {release.name}", "message": message, "color": "blue" if known else "lightgrey"}

@@ -66,22 +66,22 @@ def _difference(result: Result) -> str:
 def _notes(source: Source, results: Sequence[Result]) -> list[str]:
     """Why engines give the values of a source, why others cannot, and the remarks on the source."""
     reasons = [(group.tool, group.by, group.why) for group in source.groups if group.why]
-    reasons += [(one.tool, one.by, f"{one.status}: {one.reason.removesuffix('.')}") for one in results if one.reason]
+    reasons += [(row.tool, row.by, f"{row.status}: {row.reason.removesuffix('.')}") for row in results if row.reason]
     return [*(f"{tool}, {by}: {why}." if by else f"{tool}: {why}." for tool, by, why in dict.fromkeys(reasons)), *source.remarks]
 
 
 def _summary(results: Sequence[Result]) -> list[dict[str, str]]:
     """The number of results of each status for each source, and their sums."""
-    present = [status for status in STATUSES if any(one.status == status for one in results)]
-    names = list(dict.fromkeys(one.source for one in results))
-    counts = {name: Counter(one.status for one in results if one.source == name) for name in names}
-    counts |= {"all": Counter(one.status for one in results)} if len(names) > 1 else {}
+    present = [status for status in STATUSES if any(row.status == status for row in results)]
+    names = list(dict.fromkeys(row.source for row in results))
+    counts = {name: Counter(row.status for row in results if row.source == name) for name in names}
+    counts |= {"all": Counter(row.status for row in results)} if len(names) > 1 else {}
     return [{"source": name, **{status: str(count[status]) for status in present}} for name, count in counts.items()]
 
 
 def _verdict(results: Sequence[Result]) -> str:
     """Whether everything that is claimed to be reproducible is."""
-    counts = Counter(one.status for one in results)
+    counts = Counter(row.status for row in results)
     claimed = counts["reproduced"] + counts["differs"]
     not_run = f"; {counted(counts['not run'], 'was', 'were')} not run" if counts["not run"] else ""
     are = "is" if 1 in (counts["reproduced"], claimed) else "are"
@@ -91,6 +91,6 @@ def _verdict(results: Sequence[Result]) -> str:
 
 def exit_code(results: Sequence[Result]) -> int:
     """1 if a value differs that is claimed to be reproducible, 3 if an engine broke down, otherwise 0."""
-    if any(one.status == "differs" for one in results):
+    if any(row.status == "differs" for row in results):
         return 1
-    return 3 if any(one.verdict in BREAKDOWNS for one in results) else 0
+    return 3 if any(row.verdict in BREAKDOWNS for row in results) else 0

@@ -11,15 +11,15 @@ from dropspin.reports.stories.numbers import in_ms, quantity, unit, word
 from dropspin.scenarios.text import counted
 
 
-def document(found: Again, scene: str) -> Document:
+def document(again: Again, scene: str) -> Document:
     """A row for each time step: the leading error of the scene in the record and now, and whether the motion is the same."""
     metric = leading(scene)
     error = f"{quantity(metric)} error{unit(METRICS[metric].unit)}"
     rows = [
         {"dt": in_ms(dt), f"{error}, recorded": _value(was, metric), "now": _value(now, metric), "motion": _motion(was, now)}
-        for dt, (was, now) in found.cases.items()
+        for dt, (was, now) in again.cases.items()
     ]
-    return Document(f"{scene} again", [Table(rows), Sentences(_sentences(found))])
+    return Document(f"{scene} again", [Table(rows), Sentences(_sentences(again))])
 
 
 def _value(case: Case, metric: str) -> str:
@@ -33,26 +33,26 @@ def _motion(was: Case, now: Case) -> str:
     return "the same bits" if was.trajectory == now.trajectory else "differs"
 
 
-def _sentences(found: Again) -> list[str]:
+def _sentences(again: Again) -> list[str]:
     """Why there is no motion, whether the record was reproduced, and what is not as in the record."""
     reasons = []
-    for was, now in found.cases.values():
+    for was, now in again.cases.values():
         if was.verdict != "measured" and was.reason != now.reason:
             reasons.append(f"In the record {word(was.verdict)}: {was.reason}.")
         if now.verdict != "measured":
             reasons.append(f"{word(now.verdict).capitalize()}: {now.reason or 'the plan no longer has this time step'}.")
-    moved, count = len(found.moved), len(found.cases)
+    moved, count = len(again.moved), len(again.cases)
     differ = f"{moved} of {counted(count, 'result')} {'differs' if moved == 1 else 'differ'} from the record."
     result = differ if moved else "Every result equals that of the record, bit for bit."
-    others = "; ".join(f"{name} {now} (in the record: {was})" for name, (was, now) in found.differing.items())
+    others = "; ".join(f"{name} {now} (in the record: {was})" for name, (was, now) in again.differing.items())
     surroundings = f"Different from the record: {others}." if others else "Adapter, versions and machine are those of the record."
     return [*dict.fromkeys(reasons), result, surroundings]
 
 
-def as_data(found: Again) -> dict[str, Any]:
+def as_data(again: Again) -> dict[str, Any]:
     """Everything with all digits, for JSON."""
-    cases = [{"dt": dt, "same": dt not in found.moved, "recorded": _case(was), "now": _case(now)} for dt, (was, now) in found.cases.items()]
-    return {"cases": cases, "differing": {name: {"recorded": was, "now": now} for name, (was, now) in found.differing.items()}}
+    cases = [{"dt": dt, "same": dt not in again.moved, "recorded": _case(was), "now": _case(now)} for dt, (was, now) in again.cases.items()]
+    return {"cases": cases, "differing": {name: {"recorded": was, "now": now} for name, (was, now) in again.differing.items()}}
 
 
 def _case(case: Case) -> dict[str, Any]:

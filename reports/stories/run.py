@@ -81,6 +81,7 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = ()) -
     ]
     laws: list[Part] = [Paragraph(NOTE), Table(summary.laws)] if summary.laws else []
     failed = [f"✗ {failure.sentence}" for failure in summary.failures]
+    unexpected = [failure for failure in summary.failures if not failure.accepted]
     listed = Sentences(failed, commands=[failure.reproduce for failure in summary.failures], on_terminal=False)
     versions = ", ".join(f"{name} {version or 'not installed'}" for name, version in results.provenance["versions"].items())
     matrix, notes = matrix_of(results, summary.statuses)
@@ -93,7 +94,7 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = ()) -
         Table(statuses, on_terminal=False),
         *(replace(part, on_terminal=False) for part in laws),
         listed,
-        *(replace(part, on_page=False) for part in failure_parts(results, [one for one in summary.failures if not one.accepted])),
+        *(replace(part, on_page=False) for part in failure_parts(results, unexpected)),
         Paragraph(f"{versions} on {results.provenance['cpu']}", on_terminal=False),
     ]
     return Document("dropspin", parts, [Sentences(summary.conclusion), Paragraph(summary.verdict, style="bold")])
@@ -117,14 +118,14 @@ MUCH_SHORTER = 0.5
 """Share of the time of a run below which a quick run is mentioned."""
 
 
-def forecast_sentence(found: Forecast) -> str:
+def forecast_sentence(forecast: Forecast) -> str:
     """The time that a run will take, with that of the engine that takes longest and of a quick run; empty if it is short."""
-    if found.seconds < WORTH_SAYING:
+    if forecast.seconds < WORTH_SAYING:
         return ""
-    longest = max(found.by_engine, key=found.by_engine.__getitem__)
-    of_engine = f", of which {longest} {_minutes(found.by_engine[longest])}" if len(found.by_engine) > 1 else ""
-    of_quick = f"; --quick takes {_minutes(found.quick)}" if found.quick < MUCH_SHORTER * found.seconds else ""
-    return f"{_minutes(found.seconds)} on {counted(found.jobs, 'processor')}{of_engine}{of_quick}"
+    longest = max(forecast.by_engine, key=forecast.by_engine.__getitem__)
+    of_engine = f", of which {longest} {_minutes(forecast.by_engine[longest])}" if len(forecast.by_engine) > 1 else ""
+    of_quick = f"; --quick takes {_minutes(forecast.quick)}" if forecast.quick < MUCH_SHORTER * forecast.seconds else ""
+    return f"{_minutes(forecast.seconds)} on {counted(forecast.jobs, 'processor')}{of_engine}{of_quick}"
 
 
 def _minutes(seconds: float) -> str:

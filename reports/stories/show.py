@@ -55,8 +55,8 @@ def scene_rows(scene: Scenario) -> Rows:
 def _other_laws(truth: Truth, others: Mapping[Law, Truth]) -> str:
     """By how much the velocity after the first impact differs under the other laws of impacts with friction."""
     after = truth.events[0].after[VELOCITY]
-    found = [f"{law} {np.linalg.norm(other.events[0].after[VELOCITY] - after):.2g} m/s" for law, other in others.items() if other.events]
-    return f"velocity after the first impact differs by: {', '.join(found)}; these are other models, not errors"
+    changes = [f"{law} {np.linalg.norm(other.events[0].after[VELOCITY] - after):.2g} m/s" for law, other in others.items() if other.events]
+    return f"velocity after the first impact differs by: {', '.join(changes)}; these are other models, not errors"
 
 
 def _applies_to(expectation: Expectation) -> str:
@@ -85,10 +85,10 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
     verify_time_step(scene, dt)
     entry = present_entry(engine_name)
     with EngineProcesses(ResourceLimits(processor_time=60.0)) as processes:
-        found = processes.call(entry, _built, scene, dt)
-    if isinstance(found, Breakdown):
-        raise EngineBroken(f"{entry.label} cannot build {scene.name}: {found.reason}.")
-    return found
+        rows = processes.call(entry, _built, scene, dt)
+    if isinstance(rows, Breakdown):
+        raise EngineBroken(f"{entry.label} cannot build {scene.name}: {rows.reason}.")
+    return rows
 
 
 def _built(entry: "EngineEntry", scene: Scenario, dt: float) -> Rows:
@@ -113,14 +113,14 @@ def _built(entry: "EngineEntry", scene: Scenario, dt: float) -> Rows:
     if not engine.is_calibrated and verified_refusal(engine.calibrated.refusal(scene)) is None:
         with engine.calibrated.prepare(scene, dt) as simulation:
             calibrated = verified_settings(simulation.settings)
-    facts = [{"what": what, "is": text, "source": "", "calibrated": "", "why": why} for what, text, why in rows]
+    facts = [{"what": name, "is": text, "source": "", "calibrated": "", "why": why} for name, text, why in rows]
     return facts + _setting_rows(engine, settings, calibrated)
 
 
-def _setting_rows(engine: "Engine", found: Mapping[str, Any], calibrated: Mapping[str, Any]) -> Rows:
+def _setting_rows(engine: "Engine", settings: Mapping[str, Any], calibrated: Mapping[str, Any]) -> Rows:
     """The settings in force, each with its source, and with its calibrated value if that is another one."""
-    acting = {name: one for name, one in engine.settings.items() if not one.is_computed and engine.unmet_need(name) is None}
-    own = {name: setting.default for name, setting in acting.items()}
+    acting = {name: setting for name, setting in engine.settings.items() if not setting.is_computed and engine.unmet_need(name) is None}
+    defaults = {name: setting.default for name, setting in acting.items()}
     reasons = engine.reasons if engine.is_calibrated else {}
 
     def text(name: str, value: Any) -> str:
@@ -136,8 +136,8 @@ def _setting_rows(engine: "Engine", found: Mapping[str, Any], calibrated: Mappin
         return "computed" if engine.settings[name].is_computed else "calibrated"
 
     rows = []
-    for name, value in ({**found, **{name: own[name] for name in own if name not in found}}).items():
-        other = calibrated.get(name, own.get(name))
+    for name, value in ({**settings, **{name: defaults[name] for name in defaults if name not in settings}}).items():
+        other = calibrated.get(name, defaults.get(name))
         differs = other is not None and text(name, other) != text(name, value)
         why = str(reasons.get(name, ""))
         rows.append([name, text(name, value), source(name, value), text(name, other) if differs else "", why])
@@ -155,9 +155,10 @@ def setting_rows(engine_name: str) -> Rows:
     engine = present_entry(engine_name).adapter
     rows = [(name, values[0], "", " | ".join(values), "", "option of the adapter") for name, values in engine.choices.items()]
     rows += [
-        (name, f"{one.default:g}", "", f"{one.least:g} … {one.most:g}", "", "option of the adapter") for name, one in engine.numbers.items()
+        (name, f"{number.default:g}", "", f"{number.least:g} … {number.most:g}", "", "option of the adapter")
+        for name, number in engine.numbers.items()
     ]
-    for name, one in engine.settings.items():
-        calibrated = "computed" if one.is_computed else "" if one.calibrated is None else spelled(one.calibrated)
-        rows.append((name, spelled(one.default), calibrated, one.allowed, one.unit, one.what))
+    for name, setting in engine.settings.items():
+        calibrated = "computed" if setting.is_computed else "" if setting.calibrated is None else spelled(setting.calibrated)
+        rows.append((name, spelled(setting.default), calibrated, setting.allowed, setting.unit, setting.what))
     return [dict(zip(("name", "default", "calibrated", "allowed", "unit", "what"), row, strict=True)) for row in rows]

@@ -18,21 +18,21 @@ def rows(where: str) -> list[dict[str, Any]]:
 
     The table is read part by part, because it may be larger than memory.
     """
-    found: dict[str, dict[str, Any]] = {}
+    by_engine: dict[str, dict[str, Any]] = {}
     for part in read_sweep_parts(where, ["engine", "verdict", "steps", "time_per_step", *WORST_OF]):
         for engine, jobs in part.to_pandas().groupby("engine", sort=False):
             first = {"engine": engine, "jobs": 0, "verdicts": Counter()} | dict.fromkeys(WORST_OF.values()) | {"time": 0.0}
-            row = found.setdefault(str(engine), first)
+            row = by_engine.setdefault(str(engine), first)
             row["jobs"] += len(jobs)
             row["verdicts"].update(jobs["verdict"])
             row["time"] += float((jobs["steps"] * jobs["time_per_step"]).sum())
             for metric, name in WORST_OF.items():
                 if not math.isnan(largest := float(jobs[metric].abs().max())):
                     row[name] = max(row[name] or 0.0, largest)
-    return list(found.values())
+    return list(by_engine.values())
 
 
-def document(found: Sequence[Mapping[str, Any]]) -> Document:
+def document(table: Sequence[Mapping[str, Any]]) -> Document:
     """The rows."""
     columns = {name.replace("_", " "): name for name in WORST_OF.values()}
     shown = [
@@ -42,11 +42,11 @@ def document(found: Sequence[Mapping[str, Any]]) -> Document:
             "verdicts": ", ".join(f"{count:,} {word(verdict)}" for verdict, count in row["verdicts"].most_common()),
             **{column: formatted(math.nan if row[name] is None else row[name]) for column, name in columns.items()},
         }
-        for row in found
+        for row in table
     ]
     return Document("Jobs", [Table(shown, left_out_first=[*reversed(columns)])])
 
 
-def exit_code(found: Sequence[Mapping[str, Any]]) -> int:
+def exit_code(table: Sequence[Mapping[str, Any]]) -> int:
     """The exit code: 0 if all jobs were run, 3 if an engine broke down in any job."""
-    return 3 if any(row["verdicts"].keys() & BREAKDOWNS for row in found) else 0
+    return 3 if any(row["verdicts"].keys() & BREAKDOWNS for row in table) else 0

@@ -28,15 +28,15 @@ class TradeOffs(Study):
 
     def rows(self) -> list[dict[str, Any]]:
         """Every engine and time step tried."""
-        return [row for found in self.scenes for row in rows(found)]
+        return [row for study in self.scenes for row in rows(study)]
 
     def document(self) -> Document:
         """The Pareto front of each scene, and the cheapest configuration within each tolerance."""
         parts: list[Part] = []
-        for found in self.scenes:
-            left_out_first = [*map(_per_world, found.worlds), "on the Pareto front"]
-            parts += [Heading(found.scene.name), Charts(found.scene.name, tradeoff_charts(found))]
-            parts += [Table(pareto_front_rows(found), left_out_first), Sentences(sentences(found, self.within), numbered=True)]
+        for study in self.scenes:
+            left_out_first = [*map(_per_world, study.worlds), "on the Pareto front"]
+            parts += [Heading(study.scene.name), Charts(study.scene.name, tradeoff_charts(study))]
+            parts += [Table(pareto_front_rows(study), left_out_first), Sentences(sentences(study, self.within), numbered=True)]
         return Document("What accuracy costs", parts)
 
 
@@ -44,31 +44,31 @@ def _per_world(worlds: int) -> str:
     return f"per world (batch of {worlds})"
 
 
-def rows(found: TradeOff) -> list[dict[str, Any]]:
+def rows(study: TradeOff) -> list[dict[str, Any]]:
     """A row for every engine and time step tried, and a row without a time step for each engine that was not run.
 
     A row has the error, the median, minimum, quartiles and spread over the rounds of the wall time per simulated second [s], and the reason
     why the engine's ladder ended. Where the rounds do not decide whether a configuration is on the Pareto front, that is None.
     """
-    points = {(point.engine, point.dt): point for point in found.points}
-    front, undecided = ([(point.engine, point.dt) for point in points] for points in (found.pareto_front, found.undecided))
-    dominated_by = {point.engine: other.engine for point, other in found.dominated.items()}
+    points = {(point.engine, point.dt): point for point in study.points}
+    front, undecided = ([(point.engine, point.dt) for point in points] for points in (study.pareto_front, study.undecided))
+    dominated_by = {point.engine: other.engine for point, other in study.dominated.items()}
     return [
         {
-            "scene": found.scene.name,
-            "metric": found.metric,
+            "scene": study.scene.name,
+            "metric": study.metric,
             "engine": ladder.engine,
             "dt": dt,
             "error": error,
-            **_costs(points.get((ladder.engine, dt)), found.worlds),
-            "memory_per_world": found.memory_per_world.get(ladder.engine),
+            **_costs(points.get((ladder.engine, dt)), study.worlds),
+            "memory_per_world": study.memory_per_world.get(ladder.engine),
             "on_pareto_front": None if (ladder.engine, dt) in undecided else (ladder.engine, dt) in front,
             "dominated_by": dominated_by.get(ladder.engine),
             "ladder_ended": ladder.ended,
             "ladder_reason": ladder.reason,
             "left_out": ladder.left_out or None,
         }
-        for ladder in found.ladders
+        for ladder in study.ladders
         for dt, error in ladder.steps or [(math.nan, math.nan)]
     ]
 
@@ -83,13 +83,13 @@ def _costs(point: CostPoint | None, worlds: Sequence[int]) -> dict[str, Any]:
     return dict(zip(names, [point.typical_cost, float(point.cost.min()), quartiles, spread(point.cost), *per_world], strict=True))
 
 
-def pareto_front_rows(found: TradeOff) -> list[dict[str, str]]:
+def pareto_front_rows(study: TradeOff) -> list[dict[str, str]]:
     """The Pareto front, cheapest first, then the most accurate time step of each dominated engine, then the engines left out."""
-    undecided = found.undecided
-    shown = sorted({*found.pareto_front, *undecided}, key=lambda point: point.typical_cost)
+    undecided = study.undecided
+    shown = sorted({*study.pareto_front, *undecided}, key=lambda point: point.typical_cost)
     placed = [(point, "undecided" if point in undecided else "yes") for point in shown]
-    placed += [(point, f"dominated by {other.engine}") for point, other in found.dominated.items() if point not in undecided]
-    error, worlds = f"error [{METRICS[found.metric].unit}]", {_per_world(size): size for size in found.worlds}
+    placed += [(point, f"dominated by {other.engine}") for point, other in study.dominated.items() if point not in undecided]
+    error, worlds = f"error [{METRICS[study.metric].unit}]", {_per_world(size): size for size in study.worlds}
     rows = [
         {
             "engine": point.engine,
@@ -102,72 +102,72 @@ def pareto_front_rows(found: TradeOff) -> list[dict[str, str]]:
         for point, place in placed
     ]
     absent = dict.fromkeys(rows[0], "–") | {"on the Pareto front": "left out, see below"}
-    return rows + [absent | {"engine": label} for label in found.left_out]
+    return rows + [absent | {"engine": label} for label in study.left_out]
 
 
-def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
+def sentences(study: TradeOff, within: Sequence[float]) -> list[str]:
     """Sentences: the cheapest configuration within each tolerance, memory, the end of each ladder, and engines left out."""
-    ended = grouped([ladder for ladder in found.ladders if ladder.steps], _reason)
+    ended = grouped([ladder for ladder in study.ladders if ladder.steps], _reason)
     ends = {reason: ", ".join(f"{ladder.engine} at {in_ms(ladder.steps[-1][0])}" for ladder in alike) for reason, alike in ended.items()}
-    memory = ", ".join(f"{label} {rounded(value / 1e3, 2)} kB" for label, value in found.memory_per_world.items())
+    memory = ", ".join(f"{label} {rounded(value / 1e3, 2)} kB" for label, value in study.memory_per_world.items())
     return [
-        *(_recommendation(found, tolerance) for tolerance in within),
-        *_timings(found),
-        *([f"Memory per world in a batch of {found.worlds[-1]}: {memory}."] if memory else []),
+        *(_recommendation(study, tolerance) for tolerance in within),
+        *_timings(study),
+        *([f"Memory per world in a batch of {study.worlds[-1]}: {memory}."] if memory else []),
         *(f"No smaller time step was tried because {reason}: {engines}." for reason, engines in ends.items()),
-        *left_out(found.left_out),
+        *left_out(study.left_out),
     ]
 
 
-def _recommendation(found: TradeOff, tolerance: float) -> str:
+def _recommendation(study: TradeOff, tolerance: float) -> str:
     """A sentence with the cheapest configuration within a tolerance, the next best, and the best one in a batch."""
-    unit = "" if (of := METRICS[found.metric].unit) == "1" else f" {of}"
-    goal = f"{found.scene.name}, {found.metric.replace('_', ' ')} within {tolerance:g}{unit}"
-    advice = found.recommendation(tolerance)
+    unit = "" if (of := METRICS[study.metric].unit) == "1" else f" {of}"
+    goal = f"{study.scene.name}, {study.metric.replace('_', ' ')} within {tolerance:g}{unit}"
+    advice = study.recommendation(tolerance)
     if advice is None:
-        nearest = min(found.points, key=lambda point: point.error)
-        ladder = next(ladder for ladder in found.ladders if ladder.engine == nearest.engine)
+        nearest = min(study.points, key=lambda point: point.error)
+        ladder = next(ladder for ladder in study.ladders if ladder.engine == nearest.engine)
         last, error = ladder.steps[-1][0], f"{formatted(nearest.error)}{unit}"
         ended = f"its ladder of time steps ended at {in_ms(last)}"
         if nearest.error <= tolerance:
             none = "no configuration is within it at its time step and at all smaller ones"
-            found_here = f"{none}; {_named(nearest)} has {error}, but more at smaller time steps; {ended}"
+            outcome = f"{none}; {_named(nearest)} has {error}, but more at smaller time steps; {ended}"
         else:
             where = "where its ladder of time steps ended" if nearest.dt == last else f"and {ended}"
-            found_here = f"no tested configuration reaches it; the most accurate is {_named(nearest)} with {error}, {where}"
-        return f"{goal}: {found_here} because {_reason(ladder)}."
+            outcome = f"no tested configuration reaches it; the most accurate is {_named(nearest)} with {error}, {where}"
+        return f"{goal}: {outcome} because {_reason(ladder)}."
     sentence, ratio = f"{goal}: {_named(advice.best)}, {duration(advice.best.typical_cost)} per simulated second", advice.ratio
     if advice.next_best is None:
-        sentence += "; no other engine reaches it." if len(found.ladders) > 1 else "."
+        sentence += "; no other engine reaches it." if len(study.ladders) > 1 else "."
     elif not advice.level:
         sentence += f"; the next best, {_named(advice.next_best)}, takes {ratio:.1f} times that."
     else:
         less = f"{ratio:.1f} times that, but less in a quarter of the rounds"
         sentence += f"; {_named(advice.next_best)} takes {less if ratio >= LEVEL else f'about as long, {ratio:.2f} times that'}."
-    for size in found.worlds:
-        if batched := found.best_in_batch(tolerance, size):
+    for size in study.worlds:
+        if batched := study.best_in_batch(tolerance, size):
             cost = duration(batched.costs_per_world[size])
             sentence += f" In a batch of {size}, {_named(batched)}: {cost} per world and simulated second."
     return sentence
 
 
-def _timings(found: TradeOff) -> list[str]:
+def _timings(study: TradeOff) -> list[str]:
     """Sentences on timings that differ between rounds, what they leave undecided, and other load on the machine."""
     listed = []
-    undecided = found.undecided
+    undecided = study.undecided
     if undecided:
         are = counted(len(undecided), "configuration is", "configurations are")
         those = ", ".join(map(_named, undecided))
         listed.append(f"{are} on the Pareto front in some of the rounds only, so that the timings do not decide it: {those}.")
-    if found.spread >= LEVEL:
-        listed.append(f"Timings vary: the median of the rounds is typically {found.spread:.2g} times the least (column cost_spread).")
-    batches = [(value, size, point) for point in found.points for size, value in point.spreads_per_world.items() if value >= LEVEL]
+    if study.spread >= LEVEL:
+        listed.append(f"Timings vary: the median of the rounds is typically {study.spread:.2g} times the least (column cost_spread).")
+    batches = [(value, size, point) for point in study.points for size, value in point.spreads_per_world.items() if value >= LEVEL]
     if batches:
         value, size, point = max(batches, key=lambda batch: batch[0])
         listed.append(f"Timings of batches vary by a factor of up to {value:.2g}, that of {_named(point)} in a batch of {size}.")
-    if found.load >= BUSY:
+    if study.load >= BUSY:
         listed.append(
-            f"The machine was busy while costs were measured: {found.load:.1f} other threads per processor were running, on average; "
+            f"The machine was busy while costs were measured: {study.load:.1f} other threads per processor were running, on average; "
             "measure again on an idle machine."
         )
     return listed

@@ -8,8 +8,8 @@ _interrupts: list[int] = []
 
 def handle_interrupts() -> None:
     """Treat SIGTERM like Ctrl-C from now on, so that unfinished files are removed; record both."""
-    for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, _interrupt)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
     sys.unraisablehook = _report_unless_interrupted
 
 
@@ -24,7 +24,7 @@ def _interrupt(number: int, frame: object) -> None:
     raise KeyboardInterrupt
 
 
-def _report_unless_interrupted(found: "sys.UnraisableHookArgs") -> None:
+def _report_unless_interrupted(unraisable: "sys.UnraisableHookArgs") -> None:
     """Report an exception that Python cannot raise, unless it is an interrupt, which `stop_if_interrupted` raises again."""
-    if not isinstance(found.exc_value, KeyboardInterrupt):
-        sys.__unraisablehook__(found)
+    if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)

@@ -79,8 +79,8 @@ def _run() -> int:
     try:
         for argument in sys.argv[1:]:
             if not argument.isprintable() or len(argument) > LONGEST_ARGUMENT:
-                given = f"{argument!r:.60}"
-                raise click.UsageError(f"the argument {given} is not printable text of at most {LONGEST_ARGUMENT} characters.")
+                text = f"{argument!r:.60}"
+                raise click.UsageError(f"the argument {text} is not printable text of at most {LONGEST_ARGUMENT} characters.")
         return dropspin(prog_name="dropspin", standalone_mode=False) or 0
     except click.exceptions.NoArgsIsHelpError as error:
         error.show()

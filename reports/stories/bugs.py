@@ -32,24 +32,24 @@ class KnownBugs(Study):
         blank = Outcome(release="", state="not run")
         return [
             {"case": bug.name, "kind": bug.kind, "reference": bug.reference, "command": bug.command if bug.label else ""}
-            | {"metric": bug.metric, "verdict": words(bug, found)}
+            | {"metric": bug.metric, "verdict": words(bug, result)}
             | outcome.model_dump()
-            for bug, found in self.verdicts()
+            for bug, result in self.verdicts()
             for outcome in self.outcomes[bug.name] or [blank]
         ]
 
     def document(self) -> Document:
         """Each report with its releases, and a table of all."""
-        found = self.verdicts()
+        verdicts = self.verdicts()
         parts: list[Part] = []
-        for bug, outcome in found:
+        for bug, outcome in verdicts:
             parts += _of_bug(bug, outcome, self.outcomes[bug.name], on_terminal=len(self.bugs) <= FEW)
-        table = [{"case": bug.name, "engine": bug.engine or "–", "verdict": words(bug, outcome)} for bug, outcome in found]
-        parts += [Heading("All cases"), Table(table), Paragraph(_summary(found))]
+        table = [{"case": bug.name, "engine": bug.engine or "–", "verdict": words(bug, outcome)} for bug, outcome in verdicts]
+        parts += [Heading("All cases"), Table(table), Paragraph(_summary(verdicts))]
         return Document("Known bugs", parts)
 
 
-def _of_bug(bug: Bug, found: Verdict, outcomes: Sequence[Outcome], *, on_terminal: bool) -> list[Part]:
+def _of_bug(bug: Bug, result: Verdict, outcomes: Sequence[Outcome], *, on_terminal: bool) -> list[Part]:
     """One report."""
     parts: list[Part] = [
         Heading(f"{bug.name}: {bug.kind}", on_terminal=on_terminal),
@@ -62,7 +62,7 @@ def _of_bug(bug: Bug, found: Verdict, outcomes: Sequence[Outcome], *, on_termina
             Table([_row(bug, outcome) for outcome in outcomes], on_terminal=on_terminal),
             Sentences(_said(bug, outcomes), on_terminal=on_terminal),
         ]
-    return [*parts, Paragraph(f"Verdict: {words(bug, found)}.", style="bold", on_terminal=on_terminal)]
+    return [*parts, Paragraph(f"Verdict: {words(bug, result)}.", style="bold", on_terminal=on_terminal)]
 
 
 def _row(bug: Bug, outcome: Outcome) -> dict[str, str]:
@@ -79,27 +79,27 @@ def _said(bug: Bug, outcomes: Sequence[Outcome]) -> list[str]:
     return [*printed, *silent, *(f"{outcome.release}: {outcome.said}." for outcome in outcomes if outcome.state == "not run")]
 
 
-def words(bug: Bug, found: Verdict) -> str:
+def words(bug: Bug, result: Verdict) -> str:
     """A verdict in words."""
-    if found.kind == "fixed":
-        return f"no longer occurs since {found.since}"
-    return f"not expressible: {bug.why_not}" if found.kind == "not expressible" else found.kind
+    if result.kind == "fixed":
+        return f"no longer occurs since {result.since}"
+    return f"not expressible: {bug.why_not}" if result.kind == "not expressible" else result.kind
 
 
-def _summary(found: Sequence[tuple[Bug, Verdict]]) -> str:
+def _summary(verdicts: Sequence[tuple[Bug, Verdict]]) -> str:
     """How many reports have which verdict."""
-    kinds = Counter(verdict.kind for _, verdict in found)
-    catalogue = sum(verdict.kind in ("shown", "fixed") and not bug.silent for bug, verdict in found)
+    kinds = Counter(verdict.kind for _, verdict in verdicts)
+    catalogue = sum(verdict.kind in ("shown", "fixed") and not bug.silent for bug, verdict in verdicts)
     parts = {
         "shown": kinds["shown"] + kinds["fixed"],
         "of these fixed in a later release": kinds["fixed"],
         "by the unchanged catalogue": catalogue,
     }
     others = {kind: kinds[kind] for kind in ("not shown", "not expressible", "not run") if kinds[kind]}
-    return f"{counted(len(found), 'case')}: {', '.join(f'{count} {what}' for what, count in (parts | others).items())}."
+    return f"{counted(len(verdicts), 'case')}: {', '.join(f'{count} {name}' for name, count in (parts | others).items())}."
 
 
-def exit_code(found: Sequence[tuple[Bug, Verdict]]) -> int:
+def exit_code(verdicts: Sequence[tuple[Bug, Verdict]]) -> int:
     """1 if a release does not do what was reported, 3 if one could not be run, otherwise 0."""
-    kinds = {verdict.kind for _, verdict in found}
+    kinds = {verdict.kind for _, verdict in verdicts}
     return 1 if "not shown" in kinds else 3 if "not run" in kinds else 0

@@ -1,5 +1,6 @@
 """`dropspin replay`."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,10 +17,11 @@ from dropspin.reports.terminal.safe import echo
 @click.option("--dt", type=POSITIVE, metavar="SECONDS", help="One of the run's time steps. [default: the coarsest]")
 @click.option("-o", "--output", metavar="FILE", help="The page to write. [default: replay.html in the run's folder]")
 @click.option("--gif", metavar="FILE", help="Write an animated GIF of one scene instead.")
-@click.option("--speed", default=0.25, type=POSITIVE, help="Speed of the GIF: 1 is real time.")
+@click.option("--mp4", metavar="FILE", help="Write an MP4 video of one scene instead.")
+@click.option("--speed", default=0.25, type=POSITIVE, help="Speed of the GIF or the video: 1 is real time.")
 @click.option("--open/--no-open", "opens", default=True, show_default=False, help="Show the page in a browser. [default: --open]")
 def replay_command(
-    run: str, scenes: tuple[str, ...], dt: float | None, output: str | None, gif: str | None, speed: float, opens: bool
+    run: str, scenes: tuple[str, ...], dt: float | None, output: str | None, gif: str | None, mp4: str | None, speed: float, opens: bool
 ) -> None:
     """Show the motions of a run in 3D: engines overlaid or side by side, with the exact solution or recording dashed.
 
@@ -35,10 +37,12 @@ def replay_command(
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.scenarios import DropspinError
 
-    if gif is not None and Path(gif).suffix.lower() != ".gif":
-        raise click.UsageError(f"--gif {gif}: the file name must end in .gif.")
-    if gif is not None and output is not None:
-        raise click.UsageError(f"-o {output} names the page, but with --gif no page is written; leave -o out.")
+    films = {f"--{ending}": (clip, f".{ending}") for ending, clip in (("gif", gif), ("mp4", mp4)) if clip is not None}
+    for option, (clip, ending) in films.items():
+        if Path(clip).suffix.lower() != ending:
+            raise click.UsageError(f"{option} {clip}: the file name must end in {ending}.")
+        if output is not None:
+            raise click.UsageError(f"-o {output} names the page, but with {option} no page is written; leave -o out.")
     file = Path(run) / "replay.html" if output is None else Path(output)
     if output is None and file.is_symlink():  # the run may be somebody else's, and the link lead to any file
         raise DropspinError(f"{file}: is a link; delete it, or choose a file with -o.")
@@ -47,17 +51,18 @@ def replay_command(
     shown = [replay for replay in replays if replay is not None]
     if not shown:
         raise DropspinError(f"{run}: no engine completed a time step in these scenes; report.html has the reasons.")
-    if gif is not None:
+    for option, (clip, _) in films.items():
         if len(shown) > 1:
-            raise click.UsageError(f"a GIF shows one scene; name it: {', '.join(replay.scene.name for replay in shown)}.")
-        with share_bar(gif) as progress:
+            raise click.UsageError(f"{option} shows one scene; name it: {', '.join(replay.scene.name for replay in shown)}.")
+        with share_bar(clip) as progress:
 
-            def on_progress(share: float) -> None:
+            def on_progress(share: float, progress: Callable[[str, float], None] = progress) -> None:
                 stop_if_interrupted()
                 progress("", share)
 
-            write_clip(shown[0], gif, speed, on_progress)
-        echo(f"Written: {gif}")
+            write_clip(shown[0], clip, speed, on_progress)
+        echo(f"Written: {clip}")
+    if films:
         return
     charts = []
     for replay in shown:

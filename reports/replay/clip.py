@@ -1,4 +1,4 @@
-"""A replay as an animated GIF."""
+"""A replay as an animated GIF or an MP4 video."""
 
 import math
 from collections.abc import Callable
@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dropspin.comparisons.engines.packages import install_extra
 from dropspin.comparisons.results.folder import written_whole
+from dropspin.reports.plots.colours import human_label
 from dropspin.reports.replay.motions import Motion, Replay
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.bodies.hull import Outline
@@ -17,13 +19,14 @@ from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.surfaces import Wall
 
 if TYPE_CHECKING:
+    from matplotlib.animation import AbstractMovieWriter
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d import Axes3D
 
 Array = NDArray[np.float64]
 
 FRAME_RATE = 25
-"""Frames per second of the GIF."""
+"""Frames per second."""
 MOST_FRAMES = 5000
 MERIDIANS = 24
 """Number of meridians of a drawn sphere."""
@@ -34,26 +37,25 @@ EXACT_COLOUR = "#202428"
 
 
 def write_clip(replay: Replay, file: str | Path, speed: float, on_progress: Callable[[float], None] = lambda _: None) -> None:
-    """Write an animated GIF of a scene, the first engine filled, the others as outlines, the exact solution dashed.
+    """Write an animated GIF or an MP4 video of a scene, the first engine filled, the others as outlines, the exact solution dashed.
 
     Args:
         replay: The scene.
-        file: The file to write; its name ends in `.gif`.
-        speed: Seconds of the scene per second of the GIF.
+        file: The file to write; its name ends in `.gif` or `.mp4`.
+        speed: Seconds of the scene per second of the film.
         on_progress: Called after each frame with the fraction of frames drawn.
 
     Raises:
-        DropspinError: The GIF would have too many frames, or the file cannot be written. An earlier file of this name stays unchanged.
+        DropspinError: There would be too many frames, no encoder is installed, or the file cannot be written. An earlier file of this name
+            stays unchanged.
     """
-    from matplotlib.animation import PillowWriter
     from matplotlib.figure import Figure
 
-    times = _frame_times(replay, speed)
+    times, writer = _frame_times(replay, speed), _writer(file)
     figure = Figure(figsize=(6.4, 4.8), dpi=100)
     axes = _add_axes(figure, replay)
     shape = replay.scene.body.outline
     title = figure.suptitle("")
-    writer = PillowWriter(fps=FRAME_RATE)
     with written_whole(file) as unfinished:
         writer.setup(figure, str(unfinished), 100)  # its own context manager would encode all frames after an interrupt, too
         for number, time in enumerate(times):
@@ -66,13 +68,28 @@ def write_clip(replay: Replay, file: str | Path, speed: float, on_progress: Call
         writer.finish()
 
 
+def _writer(file: str | Path) -> "AbstractMovieWriter":
+    """The encoder of a file, by the ending of its name."""
+    from matplotlib import rcParams
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+
+    if Path(file).suffix.lower() != ".mp4":
+        return PillowWriter(fps=FRAME_RATE)
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+    except ImportError:
+        raise DropspinError(f"{file}: MP4 files need a package that is not installed: {install_extra('mp4')}.") from None
+    rcParams["animation.ffmpeg_path"] = get_ffmpeg_exe()
+    return FFMpegWriter(fps=FRAME_RATE, codec="libx264", extra_args=["-pix_fmt", "yuv420p", "-f", "mp4"])  # as all players take it
+
+
 def _frame_times(replay: Replay, speed: float) -> Array:
     """Times of the scene at which frames are drawn [s], shape (frames,)."""
     duration = max(float(motion.frames.t[-1]) for motion in replay.motions)
     slowest = duration * FRAME_RATE / MOST_FRAMES
     if not slowest <= speed < math.inf:
         raise DropspinError(
-            f"a GIF at a speed of {speed:g} has more than {MOST_FRAMES:,} frames; choose a speed of at least {slowest:.2g}."
+            f"a film at a speed of {speed:g} has more than {MOST_FRAMES:,} frames; choose a speed of at least {slowest:.2g}."
         )
     return np.arange(0.0, duration + 1e-9, speed / FRAME_RATE)
 
@@ -96,7 +113,7 @@ def _add_axes(figure: "Figure", replay: Replay) -> "Axes3D":
         axes.plot_wireframe(across, along, np.zeros_like(across), color=EXACT_COLOUR, alpha=0.2, linewidth=0.7)
     walls = [_y_up(_in_box(wall, low, high)) for wall in replay.scene.wall or ()]
     axes.add_collection3d(Poly3DCollection(walls, facecolor=EXACT_COLOUR, edgecolor=EXACT_COLOUR, alpha=0.1))
-    lines = [(motion.label, motion.colour or EXACT_COLOUR, "-" if motion.colour else "--") for motion in replay.motions]
+    lines = [(human_label(motion.label), motion.colour or EXACT_COLOUR, "-" if motion.colour else "--") for motion in replay.motions]
     handles = [axes.plot([], [], [], color=colour, linestyle=style, label=label)[0] for label, colour, style in lines]
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=9)
     return axes

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dropspin.reports.plots.colours import human_label
 from dropspin.reports.replay.motions import Motion, Replay, axis_and_angle
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import about, unrotate
@@ -64,6 +65,7 @@ def _motion(motion: Motion, interval: float, tolerance: float) -> dict[str, Any]
     turns = replace(motion, frames=replace(frames, orientation=_orientations(np.array([shown for _, shown in rotations]).T))).turns
     return {
         "label": motion.label,
+        "name": human_label(motion.label),
         "colour": motion.colour,
         "isExact": not motion.colour,
         "count": int(at_stride.sum()),

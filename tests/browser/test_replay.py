@@ -10,7 +10,7 @@ from PIL import Image
 from support.cli import dropspin
 
 import dropspin as ds
-from dropspin.reports.plots.colours import engine_colours
+from dropspin.reports.plots.colours import engine_colours, human_label
 from dropspin.scenarios.rotations import angle_between_orientations, rotate
 
 ENGINES = ["wang", "mujoco", "pybullet"]
@@ -63,7 +63,7 @@ class Replay:
 
     def cell(self, engine):
         """The last cell of an engine's row: its held impulse."""
-        return self.home.get_by_role("row").filter(has_text=engine).locator("td").last.inner_text()
+        return self.home.get_by_role("row").filter(has_text=human_label(engine)).locator("td").last.inner_text()
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def test_jumps_go_to_the_times_of_impacts(replay, results):
     J = step_impulses(results, "drop-box-anyhow", "pybullet")
     times = results.trajectories["drop-box-anyhow", "pybullet", DT].t[1:][J > 4.0 * WEIGHT]
     assert len(times) > 5
-    shown.home.get_by_role("radio", name="pybullet").check()
+    shown.home.get_by_role("radio", name="PyBullet").check()
     for time in times:
         shown.home.get_by_role("button", name="next impact").click()
         assert shown.get("viewer.time") == pytest.approx(time, abs=1e-8)
@@ -132,7 +132,7 @@ def test_chosen_body_is_filled_and_no_other(replay):
     """By pointer and by keyboard: most coloured pixels have the hue of its engine."""
     shown = replay("spin-asymmetric")
     colours = [[int(colour[i : i + 2], 16) for i in (1, 3, 5)] for colour in engine_colours(ENGINES).values()]
-    radios = [shown.home.get_by_role("radio", name=engine) for engine in ENGINES]
+    radios = [shown.home.get_by_role("radio", name=human_label(engine)) for engine in ENGINES]
     for number, choose in enumerate([radios[0].check, lambda: radios[0].press("ArrowDown"), radios[2].check]):
         choose()
         assert radios[number].is_checked()
@@ -146,8 +146,8 @@ def test_chosen_body_is_filled_and_no_other(replay):
 def test_marked_face_has_the_attitude_of_the_run(replay, results):
     """Six of eight points on the face along the body's axis z are light, where it is seen; on no other face is one."""
     shown = replay("spin-asymmetric")
-    shown.home.get_by_role("radio", name="mujoco").check()
-    for label in ("wang", "pybullet", "exact solution"):
+    shown.home.get_by_role("radio", name="MuJoCo").check()
+    for label in ("Wang's method", "PyBullet", "exact solution"):
         shown.home.get_by_label(f"show {label}").uncheck()
     motion = results.trajectories["spin-asymmetric", "mujoco", DT]
     half = np.array(results.scenes["spin-asymmetric"].body.half_extents)
@@ -240,6 +240,50 @@ def test_steps_loop_and_speed(replay):
     )
     shown.canvas.press(" ")
     assert shown.get("viewer.running") == 0
+
+
+def test_click_into_the_strip_goes_to_the_nearest_impact(replay, results):
+    shown = replay("drop-box-anyhow")
+    J = step_impulses(results, "drop-box-anyhow", "mujoco")
+    times = results.trajectories["drop-box-anyhow", "mujoco", DT].t[1:][J > 4.0 * WEIGHT]
+    strip = shown.home.get_by_role("img", name="impacts of MuJoCo")
+    width, duration = strip.bounding_box()["width"], shown.get("viewer.duration")
+    for at in (0.1, 0.3, 0.6, 0.95):
+        strip.click(position={"x": at * width, "y": 10})
+        time = shown.get("viewer.time")
+        assert np.abs(times - time).min() < 1e-8
+        assert abs(time - at * duration) <= np.abs(times - at * duration).min() + duration / width
+
+
+def test_body_fills_the_view_at_any_width(replay):
+    """A body that falls twice its size: its corners span more than a third of the height, all of them inside."""
+    for width in (400, 1600):
+        shown = replay("drop-box-corner", viewport={"width": width, "height": 900})
+        for time in (0.0, 0.3, 0.6):
+            corners = shown.get(
+                f"""(viewer.go({time}), viewer.body.corners(viewer.chosen.at({time})).map(viewer.camera.view(
+                {{left: 0, top: 0, width: viewer.canvas.clientWidth, height: viewer.canvas.clientHeight}},
+                viewer.camera.around(viewer.motions.map(motion => motion.at({time}).position))).seen).map(place => [place.x, place.y]))"""
+            )
+            size = shown.get("[viewer.canvas.clientWidth, viewer.canvas.clientHeight]")
+            corners = np.array(corners)
+            assert np.ptp(corners[:, 1]) > size[1] / 3
+            assert (corners > 0.0).all()
+            assert (corners < size).all()
+        boxes = shown.home.locator(".controls").evaluate_all("all => all.map(one => one.getBoundingClientRect().toJSON())")
+        assert max(box["right"] for box in boxes) <= width
+
+
+def test_slow_motion_around_an_impact(replay):
+    """Key S: within a quarter of a second on the screen before and after an impact, a fifth of the speed."""
+    shown = replay("drop-box-corner")
+    shown.home.get_by_label("speed").select_option("0.5")
+    impact = shown.get("viewer.chosen.impacts[0].time")
+    paces = f"[{impact} - 0.2, {impact} - 0.1, {impact} + 0.1].map(time => (viewer.go(time), viewer.pace()))"
+    assert shown.get(paces) == [0.5, 0.5, 0.5]
+    shown.canvas.press("s")
+    assert shown.home.get_by_label("slow at impacts").is_checked()
+    assert shown.get(paces) == [0.5, 0.1, 0.1]
 
 
 def test_nothing_moves_by_itself(replay):

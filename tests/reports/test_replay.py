@@ -4,6 +4,7 @@ import json
 import re
 import resource
 import shutil
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -221,6 +222,15 @@ def test_gif_shows_all_of_a_motion(folder, tmp_path):
         assert clip.info["duration"] == 40
 
 
+def test_mp4_has_the_frames_of_the_gif_and_names_its_encoder_if_that_is_missing(results, tmp_path, monkeypatch):
+    encoder = pytest.importorskip("imageio_ffmpeg")
+    write_clip(replay_of(results, "drop-box-corner"), tmp_path / "clip.mp4", 2.0)
+    assert encoder.count_frames_and_secs(str(tmp_path / "clip.mp4"))[0] == 8
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(DropspinError, match=r"clip\.mp4: MP4 files need a package that is not installed: pip install"):
+        write_clip(replay_of(results, "drop-box-corner"), tmp_path / "clip.mp4", 2.0)
+
+
 def test_gif_is_four_times_slower_than_real_time_by_default():
     assert [option.default for option in replay_command.params if option.name == "speed"] == [0.25]
 
@@ -231,8 +241,9 @@ def test_gif_is_four_times_slower_than_real_time_by_default():
         (["no-such-scene"], "this run has no scene 'no-such-scene'; choose one of drop-box-corner, spin-asymmetric, drop-ball."),
         (["drop-ball", "--dt", "0.5"], "drop-ball was not run at 0.5 s; choose one of 0.004, 0.002 s."),
         (["drop-ball", "--gif", "clip.avi"], "--gif clip.avi: the file name must end in .gif"),
+        (["drop-ball", "--mp4", "clip.gif"], "--mp4 clip.gif: the file name must end in .mp4"),
         (["drop-ball", "--gif", "clip.gif", "--speed", "nan"], "nan is not a finite number."),
-        (["drop-ball", "--gif", "clip.gif", "--speed", "1e-9"], "a GIF at a speed of 1e-09 has more than 5,000 frames"),
+        (["drop-ball", "--gif", "clip.gif", "--speed", "1e-9"], "a film at a speed of 1e-09 has more than 5,000 frames"),
         (["drop-ball", "--gif", "/dev/null/clip.gif"], "/dev/null/clip.gif: cannot be written: File exists; choose another file."),
         (["drop-ball", "--gif", "clip.gif", "-o", "page.html"], "-o page.html names the page"),
         (["--gif", "clip.gif"], "name it: drop-box-corner"),

@@ -1,7 +1,7 @@
   // --- camera ---
   const MARGIN = 1.15;
   const FOCAL = 1.2;           // of the smaller side of a view
-  const CLOSE = 4;             // sizes of the body: half of what is seen around a body that the camera follows
+  const CLOSE = 1.15;          // sizes of the body: half of what is seen around a body that the camera follows
 
   class Camera {
     constructor(bodySize) {
@@ -43,12 +43,19 @@
       this.zoomFactor = Math.max(this.closest, Math.min(10, this.zoomFactor * factor));
     }
 
-    // The projection onto a box of the canvas; `followed` is the position of a body to keep in the middle.
+    // What to keep in the view to follow bodies: the middle of their positions, and half of what is to be seen around it.
+    around(positions) {
+      const [low, high] = [Math.min, Math.max].map((extreme) => [0, 1, 2].map((i) => extreme(...positions.map((position) => position[i]))));
+      const middle = mean([low, high]);
+      return { middle, reach: CLOSE * this.size + Math.max(...positions.map((position) => size(minus(position, middle)))) };
+    }
+
+    // The projection onto a box of the canvas; `followed` is what to keep in the view, from `around`.
     view(box, followed) {
       const [right, up, back] = this.axes(), [wide, tall, deep] = this.extent, side = Math.min(box.width, box.height);
-      const focal = FOCAL * side, target = plus(followed ?? this.middle, this.offset);
+      const focal = FOCAL * side, target = plus(followed?.middle ?? this.middle, this.offset);
       const fitted = deep / 2 + MARGIN * focal * Math.max(wide / box.width, tall / box.height);
-      const whole = fitted * (followed ? Math.min(1, CLOSE * this.size / this.reach) : 1);
+      const whole = followed ? followed.reach * (0.5 + 2 * MARGIN * FOCAL) : fitted;
       this.closest = Math.min(1, 2 * FOCAL * this.size / whole);  // the body fills the view
       const distance = this.zoomFactor * whole, eye = plus(target, back, distance);
       this.scale = focal / distance;
@@ -56,6 +63,6 @@
         const arm = minus(point, eye), depth = -dot(arm, back), scale = focal / Math.max(depth, 1e-3 * distance);
         return { x: box.left + box.width / 2 + scale * dot(arm, right), y: box.top + box.height / 2 - scale * dot(arm, up), depth, scale };
       };
-      return { box, seen, eye, target, right, up, scale: this.scale, reach: followed ? CLOSE * this.size : this.reach };
+      return { box, seen, eye, target, right, up, scale: this.scale, reach: followed?.reach ?? this.reach };
     }
   }

@@ -3,7 +3,7 @@
   const SHORTEST_SHOW = 4;     // seconds that a motion lasts at least at the speed chosen first, if a speed is slow enough
   const FRAME_RATE = 60;       // of a usual screen, per second
   const FRAMES_PER_TURN = 20;  // fewer do not show in which direction a body turns
-  const HINT = "Drag: turn. Right-drag, Shift-drag: move. Wheel after a click: zoom. Keys: arrows, Shift-arrows, + −, 0 reset, Space play, comma/period frame, P/N impact.";
+  const HINT = "Drag: turn. Right-drag, Shift-drag: move. Wheel after a click: zoom. Keys: arrows, Shift-arrows, + −, 0 reset, Space play, comma/period frame, P/N impact, S slow at impacts, F follow.";
 
   const made = (tag, attributes = {}, ...children) => {
     const element = document.createElement(tag);
@@ -12,6 +12,11 @@
       else element.setAttribute(name, value);
     }
     element.append(...children);
+    return element;
+  };
+  const drawn = (name, attributes) => {
+    const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
     return element;
   };
   const labelled = (text, control) => made("label", {}, text + " ", control);
@@ -57,12 +62,12 @@
 
     row(motion, group) {
       const { viewer } = this;
-      const show = made("input", { type: "checkbox", "aria-label": `show ${motion.label}`, onchange: () => { motion.shown = show.checked; viewer.draw(); } });
+      const show = made("input", { type: "checkbox", "aria-label": `show ${motion.name}`, onchange: () => { motion.shown = show.checked; viewer.draw(); } });
       show.checked = true;
       const swatch = made("span", { class: "swatch" });
       const choose = made("input", { type: "radio", name: group, onchange: () => viewer.choose(motion) });
       choose.checked = motion === viewer.chosen;
-      const name = motion.isExact ? made("span", { class: "exact" }, swatch, motion.label) : made("label", {}, choose, " ", swatch, motion.label);
+      const name = motion.isExact ? made("span", { class: "exact" }, swatch, motion.name) : made("label", {}, choose, " ", swatch, motion.name);
       const cells = Array.from({ length: 1 + (viewer.exact ? 2 : 0) + (viewer.hasFloor ? 1 : 0) }, () => made("td"));
       return { cells, swatch, show, element: made("tr", {}, made("th", { scope: "row" }, name), made("td", {}, show), ...cells) };
     }
@@ -88,5 +93,35 @@
         swatch.style.borderColor = motion.colour || "currentColor";
         swatch.style.background = this.viewer.isFilled(motion) ? motion.colour : "none";
       });
+    }
+  }
+
+  // The impacts of each body over time; a click goes to the nearest one.
+  class Strip {
+    constructor(viewer) {
+      this.viewer = viewer;
+      this.rows = viewer.motions.filter((motion) => motion.impacts.length).map((motion) => this.row(motion));
+      this.box = made("div", { class: "strip" }, ...this.rows.flatMap((row) => [row.name, row.svg]));
+    }
+
+    row(motion) {
+      const { viewer } = this, largest = Math.max(...motion.impacts.map((impact) => impact.size));
+      const svg = drawn("svg", { viewBox: "0 0 1000 20", preserveAspectRatio: "none", role: "img", "aria-label": `impacts of ${motion.name}: ${motion.impacts.length}` });
+      const ticks = motion.impacts.map((impact) => `M${(1000 * impact.time / viewer.duration).toFixed(1)},20v${(-20 * Math.sqrt(impact.size / largest)).toFixed(1)}`);
+      const now = drawn("path", { d: "M0,0v20", class: "now" });
+      svg.append(drawn("path", { d: ticks.join(""), stroke: motion.colour || "currentColor" }), now);
+      svg.addEventListener("click", (event) => {
+        const box = svg.getBoundingClientRect(), time = (event.clientX - box.left) / box.width * viewer.duration;
+        viewer.go(motion.impacts.map((impact) => impact.time).reduce((best, other) => (Math.abs(other - time) < Math.abs(best - time) ? other : best)));
+      });
+      return { motion, svg, now, name: made("span", {}, motion.name) };
+    }
+
+    update() {
+      for (const { motion, svg, now, name } of this.rows) {
+        now.setAttribute("transform", `translate(${1000 * this.viewer.time / this.viewer.duration} 0)`);
+        svg.classList.toggle("hidden", !motion.shown);
+        name.hidden = !motion.shown;
+      }
     }
   }

@@ -17,7 +17,7 @@
 
   // A grid on a plane, about the point of it that is nearest to the target.
   const drawPlane = (pen, { seen, target, reach }, ink, { point, along, ends }) => {
-    const spacing = gridSpacing(reach), lines = Math.ceil(reach / spacing);
+    const spacing = gridSpacing(reach), lines = Math.ceil(2 * reach / spacing);
     const [x, z] = along.map((axis) => Math.round(axis.reduce((sum, share, i) => sum + share * (target[i] - point[i]), 0) / spacing));
     const within = (u, i) => (ends ? Math.max(-ends[i], Math.min(ends[i], u)) : u);
     const at = ([u, v]) => seen(point.map((start, i) => start + within(u * spacing, 0) * along[0][i] + within(v * spacing, 1) * along[1][i]));

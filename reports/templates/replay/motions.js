@@ -17,6 +17,7 @@
   class Motion {
     constructor(raw, interval) {
       this.label = raw.label;
+      this.name = raw.name;
       this.colour = raw.colour;
       this.isExact = raw.isExact;
       this.shown = true;

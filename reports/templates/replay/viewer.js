@@ -1,4 +1,9 @@
   // --- the viewer of one scene ---
+  const FAR = 1.5;             // sizes of the body: the camera follows a motion that reaches farther, so that the body fills the view
+  const SLOWER = 0.2;          // slow motion, relative to the chosen speed
+  const AROUND = 0.25;         // seconds before and after an impact that are shown in slow motion, at the chosen speed
+  const STRONG = 0.1;          // impacts with a smaller share of the largest impulse are not slowed down
+
   class Viewer {
     constructor(home, data) {
       this.home = home;
@@ -62,17 +67,20 @@
       this.layout = select([["over", "overlaid"], ["beside", "side by side"]], "over", () => this.draw());
       this.follow = made("input", { type: "checkbox", onchange: () => this.draw() });
       this.loop = made("input", { type: "checkbox" });
+      this.slow = made("input", { type: "checkbox" });
+      this.strip = new Strip(this);
       this.note = made("p", { role: "status" });
       this.readout = new Readout(this);
       this.home.replaceChildren(
         this.canvas,
-        made("p", { class: "quiet hint" }, `Motions at dt = ${Number((1000 * this.dt).toPrecision(6))} ms. ${HINT}`),
         made("p", { class: "controls" }, this.button, button("◂ frame", "one frame back", () => this.step(-1)), button("frame ▸", "one frame on", () => this.step(1)),
           ...(this.hasFloor ? this.jumps : []), this.slider, this.clock),
-        made("p", { class: "controls" }, labelled("speed", this.speed), labelled("loop", this.loop), labelled("engines", this.layout), labelled("follow", this.follow),
+        made("p", { class: "controls" }, labelled("speed", this.speed), labelled("loop", this.loop), ...(this.hasFloor ? [labelled("slow at impacts", this.slow)] : []), labelled("engines", this.layout), labelled("follow", this.follow),
           made("button", { type: "button", onclick: () => this.reset() }, "Reset view")),
         this.note,
+        this.strip.box,
         this.readout.box,
+        made("p", { class: "quiet hint" }, `Motions at dt = ${Number((1000 * this.dt).toPrecision(6))} ms. ${HINT}`),
       );
       this.updateNote();
     }
@@ -101,16 +109,24 @@
 
     play() {
       this.stop();
-      const start = { time: this.time >= this.duration - 1e-9 ? 0 : this.time, at: performance.now() };
+      if (this.time >= this.duration - 1e-9) this.seek(0);
+      let last = performance.now();
       const tick = (now) => {
-        const time = start.time + Math.max(0, now - start.at) / 1000 * Number(this.speed.value);
-        this.seek(time);
-        if (time < this.duration) this.running = requestAnimationFrame(tick);
+        this.seek(this.time + Math.max(0, now - last) / 1000 * this.pace());
+        last = now;
+        if (this.time < this.duration) this.running = requestAnimationFrame(tick);
         else if (this.loop.checked) this.play();
         else this.stop();
       };
       this.running = requestAnimationFrame(tick);
       this.button.textContent = "Pause";
+    }
+
+    // Seconds of the scene per second on the screen.
+    pace() {
+      const speed = Number(this.speed.value), { impacts } = this.chosen, largest = Math.max(...impacts.map((impact) => impact.size));
+      const isNear = impacts.some((impact) => impact.size >= STRONG * largest && Math.abs(impact.time - this.time) < AROUND * speed);
+      return this.slow.checked && isNear ? SLOWER * speed : speed;
     }
 
     stop() {
@@ -149,7 +165,7 @@
     reset() {
       const start = this.motions[0].position[0];
       this.camera.frame(this.motions.flatMap((motion) => motion.position).filter((point) => size(minus(point, start)) <= this.sight));
-      this.follow.checked = this.camera.reach > 25 * this.body.size;
+      this.follow.checked = this.camera.reach > FAR * this.body.size;
       this.draw();
     }
 
@@ -176,7 +192,7 @@
       const arrow = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
       const keys = {
         "+": () => this.zoom(1 / 1.1), "=": () => this.zoom(1 / 1.1), "-": () => this.zoom(1.1), 0: () => this.reset(), " ": () => this.toggle(),
-        ",": () => this.step(-1), ".": () => this.step(1), p: () => this.jump(-1), n: () => this.jump(1),
+        ",": () => this.step(-1), ".": () => this.step(1), p: () => this.jump(-1), n: () => this.jump(1), s: () => this.slow.click(), f: () => this.follow.click(),
       };
       if (event.ctrlKey || event.metaKey || event.altKey) return;
       if (arrow) {
@@ -200,30 +216,34 @@
       const isThere = (motion) => motion.shown && !motion.hasEnded(this.time);
       const visible = this.engines.filter(isThere), exact = this.exact && isThere(this.exact) ? this.exact : null;
       const views = this.layout.value === "beside" && visible.length > 1 ? visible.map((motion) => [motion]) : [visible];
-      const columns = Math.min(views.length, Math.max(1, Math.round(Math.sqrt(views.length * width / height))));
-      const lines = Math.ceil(views.length / columns);
+      const lines = Math.ceil(views.length / Math.max(1, Math.round(Math.sqrt(views.length * width / height))));
+      const columns = Math.ceil(views.length / lines);
+      const inSight = (motion) => size(minus(motion.at(this.time).position, this.motions[0].position[0])) <= this.sight;
+      const followed = views.map((motions) => [...motions, ...(exact ? [exact] : [])].filter(inSight).map((motion) => motion.at(this.time).position))
+        .map((positions) => (this.follow.checked && positions.length ? this.camera.around(positions) : null));
+      const reach = Math.max(...followed.map((one) => one?.reach ?? 0));  // the same scale in all views
       views.forEach((motions, i) => {
         const box = { left: (i % columns) * width / columns, top: Math.floor(i / columns) * height / lines, width: width / columns, height: height / lines };
         pen.save();
         pen.beginPath();
         pen.rect(box.left, box.top, box.width, box.height);
         pen.clip();
-        this.drawView(pen, box, motions, views.length > 1 ? motions[0] : this.chosen, exact);
-        if (views.length > 1) write(pen, motions[0].label, { x: box.left + 8, y: box.top + 14 }, this.colours, "left");
+        this.drawView(pen, box, motions, views.length > 1 ? motions[0] : this.chosen, exact, followed[i] && { ...followed[i], reach });
+        if (views.length > 1) write(pen, motions[0].name, { x: box.left + 8, y: box.top + 14 }, this.colours, "left");
         pen.restore();
       });
       this.slider.value = String(this.time / this.interval);
       this.slider.setAttribute("aria-valuetext", `${this.time.toFixed(3)} s`);
       this.clock.textContent = `${this.time.toFixed(3)} s of ${this.duration.toFixed(3)}`;
       this.readout.update(this.time);
+      this.strip.update();
       this.section.dispatchEvent(new CustomEvent("dropspin:time", { detail: this.time }));
     }
 
     // One body is filled; the others and the exact solution are outlines over it, in their own colours.
-    drawView(pen, box, motions, filled, exact) {
+    drawView(pen, box, motions, filled, exact, followed) {
       const { ink } = this.colours, colour = (motion) => motion.colour || ink;
-      const leading = motions.includes(filled) ? filled : motions[0] ?? exact;
-      const view = this.camera.view(box, this.follow.checked && leading ? leading.at(this.time).position : null);
+      const view = this.camera.view(box, followed);
       const all = [...motions, ...(exact ? [exact] : [])], others = all.filter((motion) => motion !== filled);
       for (const plane of this.planes) drawPlane(pen, view, ink, plane);
       if (this.hasFloor) {

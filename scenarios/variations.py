@@ -1,6 +1,7 @@
-"""A scene with some quantity changed.
+"""A scene with a quantity changed, for all studies.
 
-By its tables and fields; one quantity with all that goes with it; and the same motion in other units, from another place, or by other axes.
+A function changes fields of a table, or one quantity and the quantities that depend on it, or describes the same motion in other units,
+from another place or with other body axes.
 """
 
 import math

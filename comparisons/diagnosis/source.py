@@ -60,7 +60,7 @@ class Element:
         """The value of an attribute that is a number.
 
         Raises:
-            DropspinError: It is no number.
+            DropspinError: It is not a number.
         """
         try:
             return float(self.attributes.get(attribute, default))

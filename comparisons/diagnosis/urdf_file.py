@@ -21,7 +21,7 @@ class UrdfFile:
         given: Its name for messages.
 
     Raises:
-        DropspinError: It is no URDF file, or not one link of it is the root.
+        DropspinError: It is not a URDF file, or does not have exactly one root link.
     """
 
     def __init__(self, path: Path, given: str) -> None:

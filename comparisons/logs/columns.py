@@ -56,7 +56,7 @@ def read_columns(path: Path, given: str, topic: str | None) -> tuple[dict[str, A
     Args:
         path: The file.
         given: The path as the user gave it, for messages.
-        topic: The topic of an MCAP file; None for its only one.
+        topic: The topic of an MCAP file; None if it has only one topic.
 
     Returns:
         The columns of numbers by name, and the names of the tosses, each of one length; all numbers are finite.

@@ -215,7 +215,7 @@ def read_stored(folder: Path, name: str) -> bytes:
     """The content of a file in a folder that somebody else may have written.
 
     Raises:
-        ValueError: It is no regular file: reading a pipe or a device could last for ever.
+        ValueError: It is not a regular file: reading a pipe or a device could last for ever.
         OSError: It cannot be read.
     """
     path = folder / name

@@ -1,6 +1,6 @@
 """Findings about Genesis in Genesis alone: `pip install genesis-world torch scipy`, then `python docs/by_hand/check_genesis.py`.
 
-A body of 1 kg, y is up; in double precision but for the last finding. Euler's equations solved by SciPy's DOP853 are the exact solution of
+A body of 1 kg, y is up; double precision, except for the last finding. Euler's equations solved by SciPy's DOP853 are the exact solution of
 the tumbling body.
 """
 

@@ -145,9 +145,10 @@ def _estimate(label: str, parameter: str, profile: Profile, size: int) -> Estima
 
 
 def _transfer(parameter: str, first: str, second: str, profiles: Mapping[str, Profile], size: int) -> Transfer:
-    """The difference of a parameter between two engines, resample by resample."""
+    """The difference of a parameter between two engines, resample by resample, at both ends of the values that are as good as the best."""
     column, one, other = list(FIRST_GRID).index(parameter), profiles[first], profiles[second]
-    lower, upper = expanded(one.lower[:, column] - other.upper[:, column], one.upper[:, column] - other.lower[:, column], size)
+    ends = np.stack([one.lower - other.lower, one.upper - other.upper])[..., column]
+    lower, upper = expanded(ends.min(axis=0), ends.max(axis=0), size)
     differs, is_equal = lower > 0.0 or upper < 0.0, max(-lower, upper) <= EQUAL
     verdict = "equal" if is_equal else "different" if differs else "undecided"
     return Transfer(parameter, first, second, float(one.value[column] - other.value[column]), lower, upper, verdict)

@@ -35,9 +35,9 @@ GRID, FINER = 7, 8
 MOST_GRIDS = 8
 MARGIN = 0.25
 """Of a finer grid beside the estimates of the resamples, as a share of the distance of two values of the coarser one."""
-CORE = 0.05
+CORE = 0.2
 """Share of the resamples on either side of the dense part of a grid."""
-FINE_ENOUGH, FINEST = 0.8, 1e-3
+FINE_ENOUGH, FINEST = 1.0, 1e-3
 """Distance of two values of the dense part over its width, and the distance below which no finer grid is needed."""
 SHARE, LIMIT = 0.9, 2.0
 """The share of the tosses whose q is at most the limit, by the choice of δ; the engine that made the tosses leaves q near 1."""

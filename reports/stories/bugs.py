@@ -8,7 +8,7 @@ from typing import Any, Literal
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.record.bugs import Bug, Outcome, Verdict, verdict
 from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
-from dropspin.reports.stories.numbers import formatted, in_ms, quantity, unit
+from dropspin.reports.stories.numbers import formatted, in_ms, subject, unit
 from dropspin.reports.stories.study import Study
 from dropspin.scenarios.text import counted
 
@@ -66,7 +66,7 @@ def _of_bug(bug: Bug, result: Verdict, outcomes: Sequence[Outcome], *, on_termin
 
 
 def _row(bug: Bug, outcome: Outcome) -> dict[str, str]:
-    metric = f"{quantity(bug.metric)} error{unit(METRICS[bug.metric].unit)} at {in_ms(bug.dt)}"
+    metric = f"{subject(bug.metric, 'truth', '')}{unit(METRICS[bug.metric].unit)} at {in_ms(bug.dt)}"
     value = "–" if math.isnan(outcome.value) else formatted(outcome.value)
     return {"release": f"{bug.engine} {outcome.release}", metric: value, "fault": outcome.state}
 
@@ -74,7 +74,7 @@ def _row(bug: Bug, outcome: Outcome) -> dict[str, str]:
 def _said(bug: Bug, outcomes: Sequence[Outcome]) -> list[str]:
     """What the command printed in the newest release that shows the fault, or why nothing; and why releases were not run."""
     shown = [outcome for outcome in outcomes if outcome.state == "shown"]
-    printed = [f"dropspin says: {shown[-1].said}" if shown[-1].said else "dropspin says nothing about it."] if shown else []
+    printed = [f"Printed: {shown[-1].said}" if shown[-1].said else "No failed check is printed."] if shown else []
     silent = [f"Not by the unchanged catalogue: {bug.silent}."] if bug.silent else []
     return [*printed, *silent, *(f"{outcome.release}: {outcome.said}." for outcome in outcomes if outcome.state == "not run")]
 

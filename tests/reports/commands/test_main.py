@@ -51,7 +51,12 @@ reason = "no engine is that stiff"
             "1 of 1 check fails.",
             "timing the steps of each engine\n",
         ),
-        (["show", "drop-bal"], 2, "", "dropspin: scene 'drop-bal' is not in the catalogue and no file of that name exists. Did you mean"),
+        (
+            ["run", "drop-ball", "-e", "mujoco[solreff=1 2]"],
+            2,
+            "",
+            "dropspin: mujoco's option 'solreff' is unknown. Did you mean 'solref'?",
+        ),
         (["conform", "my_engine:Mine"], 3, "", "dropspin: my_engine:Mine needs the module no_such_engine, which is not installed.\n"),
     ],
     ids=[0, 1, 2, 3],

@@ -134,20 +134,20 @@ def _losses(residuals: Array, derivatives: Array, variances: Array, axes: tuple[
     values, vectors = np.linalg.eigh(np.einsum("mki,mkj->mij", derivatives, derivatives) + np.diag(variances))
     first, second = (_interpolation(axis)[1] for axis in axes)
     turned = np.einsum("tmi,mij->mtj", residuals, vectors, optimize=True).reshape(len(values), len(axes[0]), len(axes[1]), -1)
-    discrepancy, squares = 0.0, [np.einsum("ai,bj,ijn->abn", first, second, toss, optimize=True) ** 2 for toss in turned]
+
+    def losses() -> Array:
+        each = zip(turned, values + discrepancy**2, strict=True)  # one after another, for a toss takes megabytes
+        squares = (np.einsum("ai,bj,ijn->abn", first, second, toss, optimize=True) ** 2 @ (1.0 / variances) for toss, variances in each)
+        return np.log1p(np.stack(list(squares), axis=-1) / values.shape[1])
+
+    discrepancy = 0.0
     for _ in range(ROUNDS):
-        losses = _losses_with(discrepancy, squares, values)
-        best = np.unravel_index(np.argmin(losses.sum(axis=2)), losses.shape[:2])
-        at_best = np.array([toss[best] for toss in squares])
+        sums = losses().sum(axis=2)
+        a, b = np.unravel_index(np.argmin(sums), sums.shape)
+        at_best = np.einsum("i,j,mijn->mn", first[a], second[b], turned, optimize=True) ** 2
         tried = np.mean(at_best / (values + DISCREPANCIES[:, np.newaxis, np.newaxis] ** 2), axis=2)
         discrepancy = float(DISCREPANCIES[np.argmax(np.quantile(tried, SHARE, axis=1) <= LIMIT)])
-    return _losses_with(discrepancy, squares, values), discrepancy
-
-
-def _losses_with(discrepancy: float, squares: list[Array], values: Array) -> Array:
-    """The losses, shape (a, b, m), from the squares of each toss, shape (a, b, d), and the variances of these, shape (m, d)."""
-    each = zip(squares, values + discrepancy**2, strict=True)
-    return np.log1p(np.stack([toss @ (1.0 / variances) for toss, variances in each], axis=-1) / values.shape[1])
+    return losses(), discrepancy
 
 
 def _best(losses: Array, axes: tuple[Array, ...], counts: Array) -> tuple[Array, Array, Array]:

@@ -91,7 +91,7 @@ class Engine(Configured, ABC):
     precision: ClassVar[type] = np.float64
     """The precision of the engine's state: numpy.float64 or numpy.float32."""
     compiles: ClassVar[bool] = False
-    """Whether the engine compiles when a scene is first simulated; that is then done and timed apart from the simulations.
+    """Whether the engine compiles when a scene is first simulated; compilation is then done and timed separately.
 
     A batch may then differ from single simulations by rounding.
     """

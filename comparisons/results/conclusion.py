@@ -72,7 +72,7 @@ CONDITIONS: Mapping[str, Callable[[Scenario], bool]] = {
     "a body that spins at the start": lambda scene: any(scene.start.angular_velocity),
     "damping": lambda scene: scene.damping is not None,
 }
-"""What may set the scenes apart in which an engine errs."""
+"""Properties that the scenes in which an engine errs may have in common."""
 
 
 def conclude(results: Results, within: float = WITHIN) -> list[Answer]:

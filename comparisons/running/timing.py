@@ -124,7 +124,7 @@ class Timing(NamedTuple):
 
 
 def time_engine(entry: EngineEntry, scene: Scenario, dt: float) -> Timing:
-    """Time whole simulations of a scene, native steps only, and compilation apart; a failure is part of the result."""
+    """Time whole simulations of a scene, native steps only, with compilation timed separately; a failure is part of the result."""
     engine, steps = entry.adapter, scene.steps(dt)
     try:
         verify_accepted(engine, scene)

@@ -20,7 +20,7 @@ class MyEngine(ds.Engine):
     name = "my-engine"  # in results
     order = 1.0  # claimed order of accuracy in free flight, which `dropspin run` verifies; leave it out for no claim
     # precision = np.float32  # if the state is in single precision; the default is np.float64
-    # compiles = True  # with a JIT compiler (JAX, Warp, Numba): compilation is then timed apart and has time limits of its own
+    # compiles = True  # with a JIT compiler (JAX, Warp, Numba): compilation is then timed separately, with its own time limits
 
     def declines(self, scene: ds.Scenario) -> str | None:
         """The reason why a scene is not simulated, a limit of the engine or of this adapter; None if it is."""

@@ -11,7 +11,7 @@ from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES
 from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.stories.failures import reproduce, what_fails
-from dropspin.reports.stories.numbers import step, subject, word
+from dropspin.reports.stories.numbers import outcome, step, subject
 
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "known", "limited", "declined", "missing"}
 
@@ -53,7 +53,7 @@ def _case(results: Results, row: Mapping[Hashable, Any], baseline: str | None) -
         result.text = details
         case.result = [result]
     elif verdict != "passed":
-        case.result = [Skipped(f"{word(verdict)}: {_printable(row['reason'])}")]
+        case.result = [Skipped(f"{outcome(verdict)}: {_printable(row['reason'])}")]
     return case
 
 

@@ -27,7 +27,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "word", "formatted", "quantity", "duration")}
+    environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "outcome", "formatted", "quantity", "duration")}
     environment.filters |= {"chart_data": chart_data, "sha256": _base64_sha256}
     environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": MARKS}
     return environment

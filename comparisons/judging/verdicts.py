@@ -9,8 +9,22 @@ Verdict = Literal[
 ]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 """Worst first: the first verdict represents a scene and an engine."""
-WORDS = {"known": "known fault", "timed_out": "timed out", "no_truth": "no exact solution"}
-"""Words for verdicts that differ from the verdict itself."""
+Outcome = Literal["passed", "failed", "known fault", "not judged"]
+OUTCOMES: dict[str, tuple[Outcome, str]] = {
+    "passed": ("passed", ""),
+    "failed": ("failed", ""),
+    "diverged": ("failed", "diverged"),
+    "crashed": ("failed", "crashed"),
+    "timed_out": ("failed", "timed out"),
+    "broken": ("failed", "broken"),
+    "known": ("known fault", ""),
+    "limited": ("not judged", "limited"),
+    "measured": ("not judged", "measured"),
+    "no_truth": ("not judged", "no exact solution"),
+    "declined": ("not judged", "declined"),
+    "missing": ("not judged", "missing"),
+}
+"""The outcome that readers see of each verdict, and its reason; the reason is empty where the outcome has one verdict."""
 MARKS: dict[str, str] = dict(zip(VERDICTS, "✗✗⏱∞✗?–†!·✓·", strict=True))
 """Verdicts as one character."""
 FAILURES = frozenset({"failed"})
@@ -49,3 +63,8 @@ class Judgement:
     reason: str = ""
     tolerance: float = math.nan
     basis: Basis = ""
+
+
+def with_reason(outcome: str, reason: str) -> str:
+    """An outcome with its reason, such as `failed (diverged)`."""
+    return f"{outcome} ({reason})" if reason else outcome

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING, STUDIES
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, VERDICTS, WORDS
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, OUTCOMES, VERDICTS, Outcome, with_reason
 from dropspin.comparisons.measuring.metrics import leading_metric
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.ensembles import EnsembleOutcome
@@ -25,11 +25,10 @@ FRAMES = ("table", "predictions", "agreements")
 SMALLEST_STATED = 1e-4
 """Errors below this (relative to the scene's scale, in m or in rad) are not mentioned in summaries and reports."""
 
-STATUS_WORDS = {**WORDS, "limited": "known limitation"}
 PARTS = ("angular_momentum_direction_error",)
 """Metrics that another metric contains."""
-UNDECIDED = "partly undecided"
-"""The status of an engine that passes in a scene, but of which the time steps leave errors undecided."""
+UNDECIDED, MODEL_ERROR = "undecided", "model error"
+"""Reasons of a status that the verdict does not have: the time steps leave errors undecided; a known fault does not vanish as dt → 0."""
 COUNTED = ("known", "diverged", "crashed", "timed_out", "declined")
 """Verdicts that a title counts beside passed and failed checks."""
 MOST_NAMES = 4
@@ -39,15 +38,25 @@ MOST_ROWS = 60
 
 
 class Status(NamedTuple):
-    """What became of an engine in a scene: its worst verdict, and the status in words."""
+    """What became of an engine in a scene: its worst verdict, and the reason of its outcome."""
 
     verdict: str
-    words: str
+    reason: str
+
+    @property
+    def outcome(self) -> Outcome:
+        """What readers see of the verdict."""
+        return OUTCOMES[self.verdict][0]
+
+    @property
+    def words(self) -> str:
+        """The outcome with its reason, such as `passed` or `not judged (declined)`."""
+        return with_reason(self.outcome, self.reason)
 
     @property
     def mark(self) -> str:
         """The status as one character."""
-        return "~" if self.words == UNDECIDED else MARKS[self.verdict]
+        return "~" if self.reason == UNDECIDED else MARKS[self.verdict]
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +132,7 @@ class Results:
         """The status of each engine in each scene.
 
         Returns:
-            By scene and engine: the worst verdict, and the status in words, such as `converges`.
+            By scene and engine: the worst verdict, and the reason of its outcome.
         """
         table, verdicts = self.table, self.table["verdict"]
         is_small = (verdicts == "known") & ~(table["value"].abs() > SMALLEST_STATED)
@@ -134,15 +143,14 @@ class Results:
         of_rows = {
             "severity": verdicts.map(VERDICTS.index).where(~(is_small | explains_nothing | is_law)),
             "of_model": (verdicts == "known") & (table["cause"] == "model"),
-            "studied": (table["kind"] == "asymptotic_error") & ~recorded,
-            "undecided": is_undecided(table) & ~table["metric"].isin(JUMPING),
+            "undecided": is_undecided(table) & ~table["metric"].isin(JUMPING) & ~recorded,
         }
         by_pair = table[["scene", "engine"]].assign(**of_rows).groupby(["scene", "engine"])
         found = {
             (str(scene), str(engine)): _status(VERDICTS[int(severity)], *flags)
             for (scene, engine), severity, *flags in by_pair.agg({"severity": "min"} | dict.fromkeys(list(of_rows)[1:], "any")).itertuples()
         }
-        absent = Status("missing", "missing")
+        absent = _status("missing")
         return {scene: {engine: found.get((scene, engine), absent) for engine in self.engines} for scene in self.scenes}
 
     def leading_errors(self, scene: str) -> pd.DataFrame:
@@ -225,20 +233,17 @@ def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
     return (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & (reach > SMALLEST_STATED)
 
 
-def _status(worst: str, of_model: bool, studied: bool, undecided: bool) -> Status:
+def _status(worst: str, of_model: bool = False, undecided: bool = False) -> Status:
     """The status of an engine in a scene.
 
     Args:
         worst: Its worst verdict.
         of_model: Whether a known error is a model error.
-        studied: Whether the time steps give asymptotic errors.
-        undecided: Whether they leave one undecided.
+        undecided: Whether the time steps leave an asymptotic error undecided.
     """
     if worst == "known" and of_model:
-        return Status(worst, "known model error")
-    if worst in ("passed", "measured") and studied:
-        return Status(worst, UNDECIDED if undecided else "converges")
-    return Status(worst, STATUS_WORDS.get(worst, worst))
+        return Status(worst, MODEL_ERROR)
+    return Status(worst, UNDECIDED if undecided and worst in ("passed", "measured") else OUTCOMES[worst][1])
 
 
 def joined(parts: Sequence[Results], provenance: Mapping[str, Any]) -> Results:

@@ -15,6 +15,7 @@ from dropspin.comparisons.results.results import SMALLEST_STATED, Results
 from dropspin.comparisons.results.table import OF_SYMMETRIES
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from dropspin.reports.document import Document
+from dropspin.reports.html.strip import strip_of
 from dropspin.reports.pages import page
 from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.chart_data import chart_data
@@ -27,7 +28,7 @@ from dropspin.reports.stories import numbers
 from dropspin.reports.stories.contacts import worst_contacts
 from dropspin.reports.stories.error_budget import error_budgets
 from dropspin.reports.stories.impact_laws import NOTE
-from dropspin.reports.stories.matrix import leading_errors, legend_of_marks, step_times
+from dropspin.reports.stories.matrix import GLOSSARY, leading_errors, legend_of_marks, step_times
 from dropspin.reports.stories.run import Overview
 from dropspin.reports.stories.scene import left_out, modelled
 from dropspin.scenarios import reference_for
@@ -48,6 +49,8 @@ def html_report(
     finest = results.table.groupby("scene")["dt"].min().dropna().unique()
     failing = {failure.scene for failure in summary.failures}
     by_scene = enumerate(results.by_scene.items())
+    scenes = [_scene(of_scene, number, charts.get(name, {}), name in failing) for number, (name, of_scene) in by_scene]
+    strips = {scene["strip"]: scene for scene in scenes if scene["strip"]}
     return page(
         "report.html",
         **vars(summary),
@@ -61,9 +64,11 @@ def html_report(
         steps=numbers.in_ms(float(finest[0])) if len(finest) == 1 else "",
         times=step_times(results),
         legend=legend_of_marks(summary.statuses),
-        words=sorted({status.words for by_engine in summary.statuses.values() for status in by_engine.values()}),
+        glossary=GLOSSARY,
+        outcomes=[word for word in GLOSSARY if any(word == status.outcome for of in summary.statuses.values() for status in of.values())],
         plotted=len(charts),
-        scenes=[_scene(of_scene, number, charts.get(name, {}), name in failing) for number, (name, of_scene) in by_scene],
+        scenes=scenes,
+        hero=strips.get(max(strips, key=lambda strip: (strip.shows_impact, len(strip.rows), strip.difference), default=None)),
         sections=sections,
         metrics=METRICS,
         ensemble_metrics=ENSEMBLE_METRICS,
@@ -109,6 +114,7 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
         "converging": sum(budget["cause"] == "discretisation" for budget in budgets),
         "rows": _all_results(results, name, pd.concat([own, uncertain, studies, frame[frame["kind"].isin(OF_SYMMETRIES)]])),
         "replay": None if motions is None else as_data(motions),
+        "strip": None if motions is None else strip_of(motions),
         "remarks": frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).to_dict("records"),
         "agreement": pairs[~pairs["metric"].isin(order)].to_dict("records"),
         "contacts": worst_contacts(results, name),
@@ -143,7 +149,7 @@ def _all_results(results: Results, scene_name: str, rows: pd.DataFrame) -> dict[
     for row in rows.assign(place=rows["metric"].map(metrics)).sort_values(["place", "engine", "dt"]).to_dict("records"):
         name = numbers.subject(row["metric"], row["kind"]) + numbers.unit(row["unit"])
         values = [row["engine"], numbers.in_ms(row["dt"]), numbers.formatted(row["value"]), numbers.bound(row["lower"], row["upper"])]
-        judged = [f"{MARKS[row['verdict']]} {numbers.word(row['verdict'])}", row["cause"], row["reason"]]
+        judged = [f"{MARKS[row['verdict']]} {numbers.outcome(row['verdict'])}", row["cause"], row["reason"]]
         listed = (texts.setdefault(text, len(texts)) for text in [name, *values, *judged])
         found.append([engines[row["engine"]], int(row["verdict"] == "failed"), *listed])
     return {"scene": scene_name, "rows": found, "texts": list(texts)}

@@ -13,11 +13,11 @@ import numpy as np
 from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS, with_reason
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.results.results import SMALLEST_STATED, Results, Status, relative_sizes
-from dropspin.reports.stories.matrix import step_times
-from dropspin.reports.stories.numbers import duration, failing, formatted, in_ms, named, quantity, with_unit
+from dropspin.reports.stories.matrix import GLOSSARY, step_times
+from dropspin.reports.stories.numbers import duration, failing, formatted, in_ms, named, quantity, sized, with_unit
 from dropspin.scenarios.text import counted
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
         return f"{failing(tally.failed, judged, 'check')}{known}."
     passing = counted(judged, "check passes", "checks pass")
     if len(tally.known) or len(tally.limited):
-        return f"No unexpected results: {passing}{known}." if judged else f"No check passes or fails{known}."
+        return f"No check fails: {passing}{known}." if judged else f"No check passes or fails{known}."
     if judged:
         return f"{'The check passes' if judged == 1 else f'All {passing}'}{known}."
     if results.measurements.empty:
@@ -148,13 +148,15 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
 
 
 def _known(results: Results, tally: Counts) -> str:
-    """The end of a sentence: how many values show known errors or are within limitations, how many expected faults do not occur."""
+    """The end of a sentence: how many values show known faults or are limited, how many expected faults do not occur."""
     parts = ""
-    for rows, what in ((tally.known, "error"), (tally.limited, "limitation")):
+    for rows, one, many in (
+        (tally.known, "value is a known fault", "values are known faults"),
+        (tally.limited, "value is not judged (limited)", "values are not judged (limited)"),
+    ):
         if len(rows):
-            shows = counted(len(rows), f"value shows a known {what}", f"values show known {what}s")
-            parts += f"; {shows} of {named([engine for engine in results.engines if engine in set(rows['engine'])], 'engine')}"
-            parts += f" in {counted(rows['scene'].nunique(), 'scene')}" if what == "error" else ""
+            engines = named([engine for engine in results.engines if engine in set(rows["engine"])], "engine")
+            parts += f"; {counted(len(rows), one, many)}: {engines} in {counted(rows['scene'].nunique(), 'scene')}"
     return parts + (f"; {counted(tally.fixed, 'expected fault does', 'expected faults do')} not occur" if tally.fixed else "")
 
 
@@ -166,8 +168,8 @@ def missing_engines(results: Results) -> list[str]:
 def finding_sentences(results: Results) -> list[str]:
     """One sentence for each engine that is not missing.
 
-    The sentence gives the number of scenes in which the engine converges, the number with each other status, its largest error that
-    is known or does not vanish as dt → 0, and the cost of a time step.
+    The sentence gives the number of scenes with each outcome, the largest error that is known or does not vanish as dt → 0, and the cost
+    of a time step.
     """
     times, statuses, lasting = step_times(results), results.statuses(), results.asymptotic_errors("model", "setting")
     lasting = lasting[lasting["value"].abs() > SMALLEST_STATED]
@@ -185,24 +187,27 @@ def finding_sentences(results: Results) -> list[str]:
 
 
 def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], remain: Collection[str]) -> str:
-    """The number of scenes in which an engine converges, the number with each other status, and the largest known or remaining error."""
+    """The number of scenes with each outcome and reason, and the largest known or remaining error."""
     mine = results.table[results.table["engine"] == engine]
-    kinds: Counter[str] = Counter()
+    kinds: Counter[tuple[str, str]] = Counter()
     for scene, status in sorted(statuses.items(), key=lambda item: -VERDICTS.index(item[1].verdict)):
-        kinds["setting error" if scene in remain and status.verdict in CONVERGING else status.words] += 1
-    declined = kinds.pop("declined", 0)
-    others = [f"{kind} in {count}" for kind, count in kinds.items() if kind != "converges"] + [f"declines {declined}"] * bool(declined)
+        kinds[status.outcome, "setting error" if scene in remain and status.verdict in CONVERGING else status.reason] += 1
+    parts = []
+    for outcome in GLOSSARY:
+        reasons = {reason: count for (of, reason), count in kinds.items() if of == outcome}
+        total = sum(reasons.values())
+        because = ", ".join(reason if count == total else f"{reason} in {count}" for reason, count in reasons.items() if reason)
+        parts += [with_reason(f"{outcome} in {total}", because)] * bool(total)
+    outcomes = f"{', '.join(parts)} of {counted(len(statuses), 'scene')}"
     if not (mine["kind"] == "asymptotic_error").any():
         enough = is_sufficient(results.provenance["asked"]["dts"])
         none = "no asymptotic errors" + ("" if enough else ", which need three time steps that span a factor of four")
-        return f"{', '.join(others)} of {counted(len(statuses), 'scene')}; {none}"
-    exact = len(statuses) - len(results.recorded)
-    converges = ", ".join([*[f"converges in {kinds['converges']} of {counted(exact, 'scene')}"] * bool(exact), *others])
+        return f"{outcomes}; {none}"
     found = mine[mine["kind"].isin(["truth", "invariant"]) & (mine["value"].abs() > SMALLEST_STATED)]
     found = found[~found["metric"].isin([*JUMPING, *ARTEFACTS])]
     finest = found[found["dt"] == found.groupby("scene")["dt"].transform("min")]
     wrong = finest[finest["verdict"].isin(["known", "limited", *FAILURES]) | finest["cause"].isin(["model", "setting"])]
-    return f"{converges}{_largest(results, wrong)}"
+    return f"{outcomes}{_largest(results, wrong)}"
 
 
 def beside_recordings(results: Results) -> Iterator[str]:
@@ -224,9 +229,9 @@ def _largest(results: Results, errors: "pd.DataFrame") -> str:
     first = errors.to_dict("records")[int(np.argmax(sizes))]
     similar = errors["value"].abs().between(SAME_SIZE * abs(first["value"]), abs(first["value"]) / SAME_SIZE)
     equal = errors[(errors["metric"] == first["metric"]) & (sizes >= SAME_SIZE * sizes.max()) & similar]
-    size = with_unit(formatted(abs(first["value"])), first["unit"])
     names = named(list(equal["scene"].unique()), "scene")
-    return f"; largest error {quantity(first['metric'])} {size} at dt = {in_ms(first['dt'])} in {names}"
+    size = f"{quantity(first['metric'])} {sized(abs(first['value']), first['unit'])}"
+    return f"; largest error: {size} at dt = {in_ms(first['dt'])} in {names}"
 
 
 def _cost(engine: str, times: Mapping[str, float], compilation: float | None) -> list[str]:

@@ -10,13 +10,22 @@ from dropspin.comparisons.judging.verdicts import VERDICTS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.results import UNDECIDED, Results, Status
-from dropspin.reports.stories.numbers import formatted, in_ms, quantity, unit
+from dropspin.reports.stories.numbers import in_ms, quantity, short
 
 MOST_SCENES = 24
 """Largest number of rows on a terminal. Of more scenes, those in which no engine has a finding are left out first, then those with the
 least severe findings.
 """
 WITHOUT_FINDING = frozenset({"passed", "measured", "declined", "no_truth"})
+
+GLOSSARY = {
+    "passed": "Every check is within its bound. Undecided: the time steps do not show whether each error vanishes as dt → 0.",
+    "failed": "A check is outside its bound, or the engine diverged, crashed, timed out or is broken.",
+    "known fault": "An error that the scene expects of this engine by name. Model error: it does not vanish as dt → 0.",
+    "not judged": "Measured without a bound; or a limitation that the adapter reports explains the error (limited), the engine or its "
+    "adapter cannot run the scene (declined), the engine is not installed (missing), or no exact solution is known.",
+}
+"""The outcomes that readers see, and what they mean for an engine in a scene: the worst over all metrics and time steps."""
 
 
 @dataclass(frozen=True)
@@ -25,20 +34,25 @@ class Leading:
 
     Attributes:
         metric: The metric, as chosen by `Results.leading_errors`.
-        unit: Unit of the errors.
+        unit: Unit of the sizes: rad; % for ratios, and for positions, of which `of` has the length that is 100 %.
+        of: Such as `of 0.1 m`; empty for angles and ratios.
         dt: Time step [s].
-        scale: The scale of the errors, in their unit.
-        sizes: The size of the error, by engine; NaN where it is undefined.
+        sizes: The size of the error in this unit, as text by engine; of engines with a value.
         levels: The decade of the error relative to its scale, by engine, from 0 (up to 1e-8) over 1 (up to 1e-7) to 8 (above 0.1); None if
             undefined.
     """
 
     metric: str
     unit: str
+    of: str
     dt: float
-    scale: float
-    sizes: dict[str, float]
+    sizes: dict[str, str]
     levels: dict[str, int | None]
+
+    @property
+    def title(self) -> str:
+        """The quantity and its unit."""
+        return f"{quantity(self.metric)}, {self.unit}{self.of and ' '}{self.of}"
 
 
 def leading_errors(results: Results) -> dict[str, Leading]:
@@ -49,9 +63,12 @@ def leading_errors(results: Results) -> dict[str, Leading]:
         if not finest.empty:
             metric, dt, values = str(finest["metric"].iloc[0]), float(finest["dt"].iloc[0]), finest["value"].abs()
             unit = METRICS[metric].unit
-            of = scale(results.scenes[name], unit)
-            sizes = {engine: float(values.get(engine, math.nan)) for engine in results.engines}
-            found[name] = Leading(metric, unit, dt, of, sizes, {engine: level(size / of) for engine, size in sizes.items()})
+            whole = scale(results.scenes[name], unit)
+            parts = {engine: float(values.get(engine, math.nan)) / whole for engine in results.engines}
+            percent, of = 1.0 if unit == "rad" else 100.0, "" if unit in ("1", "rad") else f"of {whole:.3g}\xa0{unit}"
+            sizes = {engine: short(percent * part) for engine, part in parts.items() if not math.isnan(part)}
+            levels = {engine: level(part) for engine, part in parts.items()}
+            found[name] = Leading(metric, "rad" if unit == "rad" else "%", of, dt, sizes, levels)
     return found
 
 
@@ -63,20 +80,19 @@ def matrix_of(results: Results, statuses: Mapping[str, Mapping[str, Status]]) ->
     title = f"error at dt = {' or '.join(steps)}" if steps else "error"
     for scene in scenes:
         errors = leading.get(scene)
-        sizes = {engine: formatted(size) for engine, size in errors.sizes.items() if not math.isnan(size)} if errors else {}
+        sizes = errors.sizes if errors else {}
         values = {engine: f"{status.mark} {sizes.get(engine, '')}".rstrip() for engine, status in statuses[scene].items()}
-        rows.append({"scene": scene, title: quantity(errors.metric) + unit(errors.unit) if errors else "", **values})
+        rows.append({"scene": scene, title: errors.title if errors else "", **values})
     return rows, list(filter(None, [legend_of_marks({scene: statuses[scene] for scene in scenes}), left_out]))
 
 
 def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> str:
-    """The meaning of each mark, least severe first; one mark stands for known model errors and other known faults."""
-    shown = [status for by_engine in statuses.values() for status in by_engine.values()]
-    meant = {(status.verdict, status.mark, "known error" if status.verdict == "known" else status.words) for status in shown}
-    marks = sorted(((VERDICTS.index(verdict), mark, words) for verdict, mark, words in meant), reverse=True)
+    """The outcome of each mark, in the order of `GLOSSARY`; one mark stands for all known faults."""
+    shown = {status for by_engine in statuses.values() for status in by_engine.values()}
+    ordered = sorted(shown, key=lambda status: ([*GLOSSARY].index(status.outcome), status.reason == UNDECIDED, status.words))
     words: dict[str, dict[str, None]] = {}
-    for _, mark, status in marks:
-        words.setdefault(mark, {})[status] = None
+    for status in ordered:
+        words.setdefault(status.mark, {})[status.outcome if status.verdict == "known" else status.words] = None
     return ", ".join(f"{mark} {' or '.join(meanings)}" for mark, meanings in words.items())
 
 
@@ -87,7 +103,7 @@ def shown_scenes(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str
     found = [
         scene
         for scene, by_engine in statuses.items()
-        if any(status.verdict not in WITHOUT_FINDING or status.words == UNDECIDED for status in by_engine.values())
+        if any(status.verdict not in WITHOUT_FINDING or status.reason == UNDECIDED for status in by_engine.values())
     ]
     worst = sorted(found, key=lambda scene: min(VERDICTS.index(status.verdict) for status in statuses[scene].values()))[:MOST_SCENES]
     fine, more = len(statuses) - len(found), len(found) - len(worst)

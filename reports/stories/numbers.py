@@ -6,7 +6,7 @@ from functools import cache
 from typing import TypeVar
 
 from dropspin.comparisons.judging.error_budget import is_determined
-from dropspin.comparisons.judging.verdicts import COMBINED, WORDS
+from dropspin.comparisons.judging.verdicts import COMBINED, OUTCOMES, with_reason
 from dropspin.comparisons.measuring.symmetries import kind_of
 from dropspin.scenarios.text import counted, rounded
 
@@ -38,13 +38,32 @@ def bound(lower: float, upper: float) -> str:
 
 
 def word(verdict: str) -> str:
-    """A verdict in words."""
-    return WORDS.get(verdict, verdict)
+    """A verdict in words: the reason of its outcome, or the outcome."""
+    outcome, reason = OUTCOMES[verdict]
+    return reason or outcome
+
+
+def outcome(verdict: str) -> str:
+    """The outcome of a verdict with its reason, such as `not judged (declined)`."""
+    return with_reason(*OUTCOMES[verdict])
 
 
 def quantity(metric: str) -> str:
     """The quantity of which a metric is the error, in words; for a metric that is no error, its name."""
     return metric.replace("_", " ").removesuffix(" error")
+
+
+def short(value: float) -> str:
+    """Two significant digits, three from 100 on, with an exponent below 0.01 and from 10,000 on; an exact zero is 0."""
+    if value == 0.0 or not math.isfinite(value):
+        return formatted(value)
+    if 9.95 <= value < 1e4:
+        return f"{value:.0f}"
+    digits = f"{value:#.2g}"
+    if 0.01 <= value < 9.95:
+        return digits
+    mantissa, exponent = f"{value:.1e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
 
 
 def duration(seconds: float) -> str:
@@ -109,6 +128,11 @@ def unit(of: str) -> str:
 def with_unit(value: str, of: str) -> str:
     """A formatted value with its unit, unless it is a ratio."""
     return value if of == "1" else f"{value} {of}"
+
+
+def sized(value: float, of: str) -> str:
+    """The size of an error with its unit; that of a ratio in percent."""
+    return f"{formatted(100.0 * value)} %" if of == "1" else f"{formatted(value)} {of}"
 
 
 def subject(metric: str, kind: str, truth: str = "") -> str:

@@ -8,7 +8,7 @@ from dropspin.comparisons.results.results import Results
 from dropspin.reports.document import Heading, Part, Sentences, Table
 from dropspin.reports.stories.findings import orders
 from dropspin.reports.stories.impact_laws import law_rows
-from dropspin.reports.stories.numbers import formatted, in_ms, trend, unit, with_unit, word
+from dropspin.reports.stories.numbers import formatted, in_ms, outcome, trend, unit, with_unit
 
 
 def scene_parts(results: Results) -> list[Part]:
@@ -21,7 +21,7 @@ def scene_parts(results: Results) -> list[Part]:
             Table(_rows(of_scene), ["spread", *reversed(results.engines)]),
             Sentences([*_trends(of_scene, name), *_uncertainties(of_scene), *_ensemble(of_scene, name)], style="dim"),
             Table(law_rows(of_scene)),
-            Sentences([f"{row['engine']}: {word(row['verdict'])}. {row['reason']}" for row in remarks]),
+            Sentences([f"{row['engine']}: {outcome(row['verdict'])}. {row['reason']}" for row in remarks]),
         ]
     return parts
 

@@ -58,10 +58,14 @@ class Sentences(Part):
 
 @dataclass(frozen=True)
 class Table(Part):
-    """Rows of texts by column; a narrow terminal leaves out the columns in `left_out_first`, in this order."""
+    """Rows of texts by column; a narrow terminal leaves out the columns in `left_out_first`, in this order.
+
+    An HTML page colours the cells for which `levels` has the decade of an error, from 0 to 8, by row and column.
+    """
 
     rows: Sequence[Mapping[str, str]]
     left_out_first: Sequence[str] = ()
+    levels: Sequence[Mapping[str, int | None]] = ()
 
 
 @dataclass(frozen=True)

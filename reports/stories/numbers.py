@@ -38,8 +38,8 @@ def bound(lower: float, upper: float) -> str:
 
 
 def word(verdict: str) -> str:
-    """A verdict in words: the reason of its outcome, or the outcome."""
-    outcome, reason = OUTCOMES[verdict]
+    """A verdict in words: the reason of its outcome, or the outcome; `not measured`, of a record, stays."""
+    outcome, reason = OUTCOMES.get(verdict, (verdict, ""))
     return reason or outcome
 
 

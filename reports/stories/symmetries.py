@@ -8,6 +8,7 @@ from typing import Any, Literal
 from dropspin.comparisons.measuring.symmetries import NAMES
 from dropspin.comparisons.symmetries.findings import STATUSES, Finding, Status
 from dropspin.reports.document import Document, Paragraph, Sentences, Table
+from dropspin.reports.stories.matrix import level
 from dropspin.reports.stories.numbers import grouped
 from dropspin.reports.stories.study import Study
 
@@ -35,14 +36,16 @@ class Symmetries(Study):
     def document(self) -> Document:
         """The worst finding for each engine and symmetry, and each symmetry that is not kept."""
         listed = Sentences(sentences(self.findings), numbered=True)
-        return Document("Symmetries and repeated runs", [Table(worst_rows(self.findings)), Paragraph(legend(self.findings)), listed])
+        return Document("Symmetries and repeated runs", [worst_table(self.findings), Paragraph(legend(self.findings)), listed])
 
 
-def worst_rows(findings: Sequence[Finding]) -> list[dict[str, str]]:
-    """The worst finding of all scenes for each symmetry, with a column for each engine."""
+def worst_table(findings: Sequence[Finding]) -> Table:
+    """The worst finding of all scenes for each symmetry, with a column for each engine, coloured by the difference."""
     engines, tested = (dict.fromkeys(getattr(finding, name) for finding in findings) for name in ("engine", "symmetry"))
     names = [name for name in dict.fromkeys([*NAMES, *tested]) if name in tested]
-    return [{"the scene": name, **{engine: _cell(_of(findings, engine, name)) for engine in engines}} for name in names]
+    worst = [{engine: _of(findings, engine, name) for engine in engines} for name in names]
+    rows = [{"the scene": name, **{engine: _cell(of) for engine, of in row.items()}} for name, row in zip(names, worst, strict=True)]
+    return Table(rows, levels=[{engine: level(of[0].difference) for engine, of in row.items() if of} for row in worst])
 
 
 def _of(findings: Sequence[Finding], engine: str, symmetry: str) -> list[Finding]:

@@ -71,7 +71,7 @@ def write_pages(place):
     assert dropspin("replay", made, "--no-open", cwd=place).returncode == 0
 
 
-LIMITED = "known limitation"
+LIMITED = "not judged"
 
 
 def test_poses_are_those_of_the_trajectories(opened, results, folder):
@@ -234,7 +234,7 @@ def test_filters_hide_scenes_and_engines_and_count_the_rest(opened, results):
     tab.locator("#filters").get_by_label("Status").select_option(LIMITED)
     tab.get_by_role("checkbox", name="wang").uncheck()
     found = overview(results).statuses
-    left = {scene for scene, of in found.items() if LIMITED in (of["mujoco"].words, of["pybullet"].words)}
+    left = {scene for scene, of in found.items() if LIMITED in (of["mujoco"].outcome, of["pybullet"].outcome)}
     assert {one.get_attribute("data-scene") for one in sections.all()} == left
     assert 0 < len(left) < len(results.scenes)
     tab.locator("#filters").get_by_label("Status").select_option("")

@@ -344,9 +344,9 @@ def studied():
 def test_the_page_shows_orders_and_asymptotic_errors(studied):
     """Orders in a column of their own, with window and limit; model errors named above and on a chip."""
     _, text = studied
-    assert "converges in 0 of 1 scene, known model error in 1; largest error orientation 2.67 rad at dt = 2 ms in spin-asymmetric; " in text
-    assert "mujoco: converges in 1 of 1 scene; " in text
-    assert len(re.findall(r'<span class="status known">†<span class="words"> known model error</span></span>', text)) == 1
+    assert "known fault in 1 (model error) of 1 scene; largest error: orientation 2.67 rad at dt = 2 ms in spin-asymmetric; " in text
+    assert "mujoco: passed in 1 of 1 scene; " in text
+    assert len(re.findall(r'<span class="status known">†<span class="words"> known fault</span></span>', text)) == 1
     assert len(re.findall(r">order 1\.0[012] ", text)) >= 4
     assert ">→ 0.753</td>" in text
     assert "fitted at 0.008, 0.004, 0.002 s; claimed 1" in text
@@ -368,7 +368,7 @@ def test_two_time_steps_give_no_asymptotic_errors():
     assert not found.table["kind"].isin(["order", "asymptotic_error"]).any()
     [sentence] = overview(found).findings
     assert sentence.startswith(
-        "mujoco: measured in 1 of 1 scene; no asymptotic errors, which need three time steps that span a factor of four; "
+        "mujoco: not judged in 1 (measured) of 1 scene; no asymptotic errors, which need three time steps that span a factor of four; "
     )
 
 

@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import re
 from functools import cache
 from typing import Any
 
@@ -28,9 +29,15 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "outcome", "formatted", "quantity", "duration")}
+    environment.filters["unbroken"] = _unbroken
     environment.filters |= {"chart_data": chart_data, "sha256": _base64_sha256}
     environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": MARKS}
     return environment
+
+
+def _unbroken(text: str) -> str:
+    """A sentence that is not broken between a number and its unit."""
+    return re.sub(r"(?<=\d) (?=(?:%|[mµn]?s|m|rad)(?!\w))", "\xa0", text)
 
 
 def _base64_sha256(text: str) -> str:

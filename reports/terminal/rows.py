@@ -11,8 +11,8 @@ from dropspin.reports.document import Document, Heading, Paragraph, Sentences, T
 from dropspin.reports.output import json_text
 from dropspin.reports.terminal.safe import echo, styled
 
-PIECES = re.compile(r"(?<=\s)(?!(?<=\d\s)\S{1,4}\b)|(?:(?<=\w[\[=])|(?<=\w,))(?=[A-Za-z])")
-"""The places at which a line of a cell may be broken: spaces that are not between a number and its unit, and between options of an
+PIECES = re.compile(r"(?<=\s)(?!(?<=\d\s)(?:%|\S{1,4}\b))|(?:(?<=\w[\[=])|(?<=\w,))(?=[A-Za-z])")
+"""The places at which a line may be broken: spaces that are not between a number and its unit, and between options of an
 engine.
 """
 GAP = 3
@@ -96,8 +96,9 @@ def print_row(cells: Sequence[str], widths: Sequence[int], console: Console) -> 
 
 
 def print_sentence(sentence: str, console: Console, style: str = "") -> None:
-    """Print a sentence, with line breaks between words on a terminal and as one line elsewhere."""
-    console.print(styled(sentence, style=style), soft_wrap=not console.is_terminal)
+    """Print a sentence, on a terminal with line breaks between words, but not between a number and its unit; elsewhere as one line."""
+    text = _wrapped(sentence, console.width) if console.is_terminal else sentence
+    console.print(styled(text, style=style), soft_wrap=True)
 
 
 def _longest_piece(cells: Iterable[str]) -> int:

@@ -10,7 +10,7 @@ from support.cli import TERMINAL, dropspin
 import dropspin as ds
 from dropspin.reports.stories.matrix import MOST_SCENES, shown_scenes
 from dropspin.reports.stories.run import overview
-from dropspin.reports.terminal.rows import print_rows
+from dropspin.reports.terminal.rows import print_rows, print_sentence
 from dropspin.reports.terminal.run_table import print_table
 
 FINE = ("passed", "not judged (declined)")
@@ -166,3 +166,15 @@ def test_table_keeps_numbers_whole(capsys, monkeypatch):
     assert "49.1 ns" in text
     assert "9.87e-05" not in text
     assert "Columns not shown at this width: least wanted; " in text
+
+
+@pytest.mark.parametrize("width", range(24, 44))
+def test_sentence_is_not_broken_between_a_number_and_its_unit(capsys, width):
+    from rich.console import Console
+
+    sentence = "For energy within 1 % use wang at 2 ms or less; 1 s of motion takes wang 94 µs, mujoco 4.8 ms."
+    print_sentence(sentence, Console(width=width, force_terminal=True, color_system=None))
+    lines = capsys.readouterr().out.splitlines()
+    assert " ".join(lines) == sentence
+    assert max(map(len, lines)) <= width
+    assert not any(re.search(r"\d$", line) for line in lines[:-1])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dropspin.comparisons.judging.verdicts import VERDICTS
+from dropspin.comparisons.judging.verdicts import VERDICTS, with_reason
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.results import UNDECIDED, Results, Status
@@ -65,7 +65,7 @@ def leading_errors(results: Results) -> dict[str, Leading]:
             unit = METRICS[metric].unit
             whole = scale(results.scenes[name], unit)
             parts = {engine: float(values.get(engine, math.nan)) / whole for engine in results.engines}
-            percent, of = 1.0 if unit == "rad" else 100.0, "" if unit in ("1", "rad") else f"of {whole:.3g}\xa0{unit}"
+            percent, of = 1.0 if unit == "rad" else 100.0, "" if unit in ("1", "rad") else f"of {whole:.2g} {unit}"
             sizes = {engine: short(percent * part) for engine, part in parts.items() if not math.isnan(part)}
             levels = {engine: level(part) for engine, part in parts.items()}
             found[name] = Leading(metric, "rad" if unit == "rad" else "%", of, dt, sizes, levels)
@@ -89,11 +89,13 @@ def matrix_of(results: Results, statuses: Mapping[str, Mapping[str, Status]]) ->
 def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> str:
     """The outcome of each mark, in the order of `GLOSSARY`; one mark stands for all known faults."""
     shown = {status for by_engine in statuses.values() for status in by_engine.values()}
-    ordered = sorted(shown, key=lambda status: ([*GLOSSARY].index(status.outcome), status.reason == UNDECIDED, status.words))
-    words: dict[str, dict[str, None]] = {}
-    for status in ordered:
-        words.setdefault(status.mark, {})[status.outcome if status.verdict == "known" else status.words] = None
-    return ", ".join(f"{mark} {' or '.join(meanings)}" for mark, meanings in words.items())
+    parts = []
+    for outcome in GLOSSARY:
+        mine = sorted((status for status in shown if status.outcome == outcome), key=lambda status: status.reason)
+        marks = {status.mark: None for status in mine if not status.reason or status.verdict == "known"}
+        reasons = {f"{status.mark} {status.reason}": None for status in mine if status.reason and status.verdict != "known"}
+        parts += [with_reason(" ".join([*marks, outcome]), ", ".join(reasons))] * bool(mine)
+    return ", ".join(parts)
 
 
 def shown_scenes(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str], str]:

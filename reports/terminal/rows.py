@@ -11,10 +11,10 @@ from dropspin.reports.document import Document, Heading, Paragraph, Sentences, T
 from dropspin.reports.output import json_text
 from dropspin.reports.terminal.safe import echo, styled
 
-PIECES = re.compile(r"(?<=\s)(?!(?<=\d\s)(?:%|\S{1,4}\b))|(?:(?<=\w[\[=])|(?<=\w,))(?=[A-Za-z])")
-"""The places at which a line may be broken: spaces that are not between a number and its unit, and between options of an
-engine.
-"""
+SPACES = re.compile(r"(?<=\s)(?!(?<=\d\s)(?:%|\S{1,4}\b))")
+"""The places at which a sentence may be broken: spaces that are not between a number and its unit."""
+PIECES = re.compile(rf"{SPACES.pattern}|(?:(?<=\w[\[=])|(?<=\w,))(?=[A-Za-z])")
+"""The places at which a line of a cell may be broken: those of a sentence, and between options of an engine."""
 GAP = 3
 """Number of characters between two columns of a table."""
 NARROWEST = 24
@@ -39,7 +39,10 @@ def print_document(document: Document, console: Console | None = None) -> None:
             case Heading(text):
                 print_sentence(f"\n{text}" if number else text, console)
             case Paragraph(text, command, style):
-                console.print(styled(f"{text} {command}".strip(), style), soft_wrap=bool(command) or not console.is_terminal)
+                if command:
+                    console.print(styled(f"{text} {command}".strip(), style), soft_wrap=True)
+                else:
+                    print_sentence(text, console, style)
             case Sentences(items, style=style):
                 for sentence in items:
                     print_sentence(sentence, console, style)
@@ -97,7 +100,7 @@ def print_row(cells: Sequence[str], widths: Sequence[int], console: Console) -> 
 
 def print_sentence(sentence: str, console: Console, style: str = "") -> None:
     """Print a sentence, on a terminal with line breaks between words, but not between a number and its unit; elsewhere as one line."""
-    text = _wrapped(sentence, console.width) if console.is_terminal else sentence
+    text = _wrapped(sentence, console.width, SPACES) if console.is_terminal else sentence
     console.print(styled(text, style=style), soft_wrap=True)
 
 
@@ -121,10 +124,10 @@ def _widths(columns: Sequence[Sequence[str]], available: int) -> list[int]:
     return widths
 
 
-def _wrapped(text: str, width: int) -> str:
+def _wrapped(text: str, width: int, places: re.Pattern[str] = PIECES) -> str:
     """A text with line breaks, so that no line is wider than the width unless a single word is."""
     lines = [""]
-    for piece in PIECES.split(text):
+    for piece in places.split(text):
         if lines[-1] and cell_len(lines[-1] + piece.rstrip()) > width:
             lines.append("")
         lines[-1] += piece

@@ -23,7 +23,7 @@ GLOSSARY = {
     "failed": "A check is outside its bound, or the engine diverged, crashed, timed out or is broken.",
     "known fault": "An error that the scene expects of this engine by name. Model error: it does not vanish as dt → 0.",
     "not judged": "Measured without a bound; or a limitation that the adapter reports explains the error (limited), the engine or its "
-    "adapter cannot run the scene (declined), the engine is not installed (missing), or no exact solution is known.",
+    "adapter cannot run the scene (declined), the engine is not installed (missing), or no reference is known.",
 }
 """The outcomes that readers see, and what they mean for an engine in a scene: the worst over all metrics and time steps."""
 

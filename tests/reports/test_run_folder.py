@@ -343,7 +343,7 @@ def studied():
 
 def test_the_page_shows_orders_and_asymptotic_errors(studied):
     """Orders in a column of their own, with window and limit; model errors named above and on a chip."""
-    _, text = studied
+    text = studied[1].replace("\xa0", " ")
     assert "known fault in 1 (model error) of 1 scene; largest error: orientation 2.67 rad at dt = 2 ms in spin-asymmetric; " in text
     assert "mujoco: passed in 1 of 1 scene; " in text
     assert len(re.findall(r'<span class="status known">†<span class="words"> known fault</span></span>', text)) == 1

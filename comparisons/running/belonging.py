@@ -28,7 +28,7 @@ EXPLAINED = 0.1
 AT_START = 1e-3
 """Largest difference of the first state from the start; a velocity may also be a time step early or late."""
 STAYS = 1e-6
-"""A body that moves by at most this share of its size stays, up to rounding: its positions tell nothing of its velocities."""
+"""A body that moves by at most this share of its size stays, up to rounding: its positions do not determine its velocities."""
 UNITS_OF_TIME = {1e3: "ms", 1e6: "µs", 1e9: "ns", 1.0 / 60.0: "minutes"}
 LONGEST = 2000  # rows that are compared
 

@@ -25,7 +25,7 @@ REASONS = {
     "linearDamping": "1 - exp(-rate), of a second; 0.01 by default; angularDamping is the same",
     "friction": "1e9 where the floor grips",
 }
-"""Effects were measured at 1 ms each without the setting."""
+"""Effects were measured at 1 ms without the one setting."""
 
 
 class CannonES(NodeEngine):

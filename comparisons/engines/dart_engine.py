@@ -24,7 +24,7 @@ REASONS = {
     "restitution": "e + (1 + e) 1e-5: DART's contacts are compliant by 1e-5, which Python cannot set; uncorrected, 0.5 becomes 0.499985",
     "friction": "the scene's coefficient; 1e6 where the floor grips (1e2 to 1e9 give the same)",
 }
-"""Effects were measured on balls dropped from 1 m and boxes on an edge, tipping and turning flat, each without the setting."""
+"""Effects were measured on balls dropped from 1 m and boxes on an edge, tipping and turning flat, without the one setting."""
 
 
 class Dart(Engine):

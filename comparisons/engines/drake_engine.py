@@ -31,7 +31,7 @@ REASONS = {
     "stiffness": "N/m, floor and body; contacts lie on the stiffer; if equal, half a depth inside, and a gripped ball errs by 13 mm/s",
     "friction": "the scene's coefficient; 1e6 where the floor grips (1e3 gives the same)",
 }
-"""Effects were measured at 1 ms on boxes and a ball with backspin that lands at 3 m/s, each without the setting."""
+"""Effects were measured at 1 ms on boxes and a ball with backspin that lands at 3 m/s, without the one setting."""
 
 
 class Drake(Engine):

@@ -28,7 +28,7 @@ REASONS = {
     "spectralRadius": "Exudyn's own, of generalized-alpha alone; at 1 it makes the errors of trapezoidal, which differ by 0.5 %",
     "damping": "N s/m, and N m s in the body's axes: m c and I c, which give the scene's decay",
 }
-"""Effects were measured on tumbling bodies at 1 ms, each without the setting."""
+"""Effects were measured on tumbling bodies at 1 ms, without the one setting."""
 
 
 class Exudyn(Engine):

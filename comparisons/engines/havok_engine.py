@@ -23,7 +23,7 @@ REASONS = {
     "friction": f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution",
     "angularDamping": "the scene's rate; 0.1 by default",
 }
-"""Effects were measured at 1 ms each without the setting."""
+"""Effects were measured at 1 ms without the one setting."""
 
 
 class Havok(NodeEngine):

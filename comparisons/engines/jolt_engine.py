@@ -26,7 +26,7 @@ REASONS = {name: why for name, (_, why) in (SYSTEM | BODY).items()} | {
     "mLinearDamping": "(1 - exp(-rate dt))/dt, for Jolt multiplies by 1 - c dt; 0.05 by default; mAngularDamping is the same",
     "mFriction": f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution",
 }
-"""Effects were measured at 1 ms each without the setting."""
+"""Effects were measured at 1 ms without the one setting."""
 
 
 class Jolt(NodeEngine):

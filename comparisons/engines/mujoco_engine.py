@@ -98,7 +98,7 @@ FEWEST_SPRING_STEPS = 5  # with fewer steps the restitution is between 0.25 and 
 REASONS = {name: setting.why for name, setting in (CONTACT | OPTION | FLAGS).items() if setting.why} | {
     "autoreset": "a simulation that broke down stays broken; MuJoCo would put it back to its start without notice",
 }
-"""Effects were measured on a ball dropped from 1 m and boxes on a corner and at rest, restitution 0.5, each without the setting."""
+"""Effects were measured on a ball dropped from 1 m and boxes on a corner and at rest, restitution 0.5, without the one setting."""
 SPRING = "a spring that only pushes, with stiffness and damping for this many steps of contact and for e; the values hold for this dt only"
 
 

@@ -29,7 +29,7 @@ REASONS = {
     "bounce_vel": "m/s, the scene's rest speed",
     "linear_damping": "1 - exp(-rate dt), of a step; angular_damping is the same",
 }
-"""Effects were measured at 1 ms each without the setting."""
+"""Effects were measured at 1 ms without the one setting."""
 
 ode.dInitODE2(0)
 

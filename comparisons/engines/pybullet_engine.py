@@ -41,7 +41,7 @@ REASONS = {name: setting.why for name, setting in SETTINGS.items() if setting.wh
     "fixedTimeStep": "the step asked for; Bullet's own is 1/240 s",
     "coordinates": "maximal: a rebound of e times the approach speed; a multibody's is e (u + g dt), and its speeds are clamped at 100",
 }
-"""Effects were measured on a ball dropped from 1 m and a box at rest, restitution 0.5, each without the setting."""
+"""Effects were measured on a ball dropped from 1 m and a box at rest, restitution 0.5, without the one setting."""
 
 
 COEFFICIENTS = ("restitution", "lateralFriction")

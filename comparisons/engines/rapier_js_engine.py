@@ -26,7 +26,7 @@ REASONS = {name: why for name, (_, why) in PARAMETERS.items()} | {
     "linearDamping": f"{why_damping()}; angularDamping is the same",
     "friction": WHY_FRICTION,
 }
-"""Effects were measured at 1 ms each without the setting."""
+"""Effects were measured at 1 ms without the one setting."""
 
 
 class RapierJS(NodeEngine):

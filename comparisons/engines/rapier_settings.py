@@ -72,4 +72,4 @@ SURFACE = {
 FLOOR = {f"floor_{name}": setting._replace(what="of the floor") for name, setting in SURFACE.items()}
 SETTINGS = WORLD | BODY | SURFACE | FLOOR
 REASONS = {name: setting.why for name, setting in SETTINGS.items() if setting.why}
-"""Effects were measured at 1 ms each without the setting."""
+"""Effects were measured at 1 ms without the one setting."""

@@ -38,7 +38,7 @@ REASONS = {
     "linear_damping": "(1 - exp(-rate dt))/dt: PhysX multiplies by 1 - c dt, which gives the scene's decay; angular_damping is the same",
     "friction": f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution: in SAPIEN, PhysX takes the average",
 }
-"""Effects were measured at 1 ms on the core catalogue and on a ball that slides with spin about its path, each without the setting."""
+"""Effects were measured at 1 ms on the core catalogue and on a ball that slides with spin about its path, without the one setting."""
 
 
 class Sapien(Engine):

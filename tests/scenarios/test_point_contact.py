@@ -157,7 +157,7 @@ def test_steady_rolling_on_a_rim(angle, precession, half_length):
     way = rate * half_length * math.sin(angle) - spin * 0.1
     np.testing.assert_allclose(np.linalg.norm(motion.velocity, axis=1), abs(way), rtol=0, atol=1e-13)
     if precession is None:
-        assert np.ptp(motion.position, axis=0).max() < 1e-13
+        assert np.ptp(motion.position, axis=0).max() < 0.1 * 1e-11  # the radius times the allowed error of the precession
 
 
 def test_eulers_disc_without_thickness_has_the_known_rate():

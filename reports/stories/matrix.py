@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dropspin.comparisons.judging.verdicts import VERDICTS, with_reason
+from dropspin.comparisons.judging.verdicts import VERDICTS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.results import UNDECIDED, Results, Status
@@ -87,15 +87,10 @@ def matrix_of(results: Results, statuses: Mapping[str, Mapping[str, Status]]) ->
 
 
 def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> str:
-    """The outcome of each mark, in the order of `GLOSSARY`; one mark stands for all known faults."""
+    """What each mark stands for, in the order of `GLOSSARY`; one mark stands for all known faults."""
     shown = {status for by_engine in statuses.values() for status in by_engine.values()}
-    parts = []
-    for outcome in GLOSSARY:
-        mine = sorted((status for status in shown if status.outcome == outcome), key=lambda status: status.reason)
-        marks = {status.mark: None for status in mine if not status.reason or status.verdict == "known"}
-        reasons = {f"{status.mark} {status.reason}": None for status in mine if status.reason and status.verdict != "known"}
-        parts += [with_reason(" ".join([*marks, outcome]), ", ".join(reasons))] * bool(mine)
-    return ", ".join(parts)
+    in_order = sorted(shown, key=lambda status: (list(GLOSSARY).index(status.outcome), status.reason))
+    return ", ".join(dict.fromkeys(f"{status.mark} {status.outcome if status.verdict == 'known' else status.words}" for status in in_order))
 
 
 def shown_scenes(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str], str]:

@@ -146,6 +146,14 @@ def compile_cached(function: Callable[..., Any], *other_sources: Path) -> Callab
         return njit(nogil=True, error_model="numpy", cache=writable)(function)
 
 
+def called(kernel: Callable[..., Any], *arguments: Any) -> Any:
+    """What a kernel returns; one for which the disk has no room, which numba reports after it compiled it, works without the cache."""
+    try:
+        return kernel(*arguments)
+    except OSError:
+        return kernel(*arguments)
+
+
 @contextmanager
 def _cache_folder(other_sources: tuple[Path, ...]) -> Iterator[bool]:
     """Make numba use this package's cache folder while a kernel is declared; the user's setting is restored afterwards."""

@@ -88,9 +88,17 @@ def matrix_of(results: Results, statuses: Mapping[str, Mapping[str, Status]]) ->
 
 def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> str:
     """What each mark stands for, in the order of `GLOSSARY`; one mark stands for all known faults."""
-    shown = {status for by_engine in statuses.values() for status in by_engine.values()}
-    in_order = sorted(shown, key=lambda status: (list(GLOSSARY).index(status.outcome), status.reason))
-    return ", ".join(dict.fromkeys(f"{status.mark} {status.outcome if status.verdict == 'known' else status.words}" for status in in_order))
+    shown = sorted({status for by_engine in statuses.values() for status in by_engine.values()}, key=lambda status: status.reason)
+    parts = []
+    for outcome in GLOSSARY:
+        alike = [status for status in shown if status.outcome == outcome]
+        if outcome == "not judged":
+            words, head = [status.reason for status in alike], f"{outcome}: "
+        else:
+            words, head = [outcome if status.verdict == "known" else status.words for status in alike], ""
+        marks = dict.fromkeys(f"{status.mark} {word}" for status, word in zip(alike, words, strict=True))
+        parts += [head + ", ".join(marks)] * bool(marks)
+    return "; ".join(parts)
 
 
 def shown_scenes(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str], str]:

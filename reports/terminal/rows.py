@@ -101,7 +101,7 @@ def print_row(cells: Sequence[str], widths: Sequence[int], console: Console) -> 
 def print_sentence(sentence: str, console: Console, style: str = "") -> None:
     """Print a sentence, on a terminal with line breaks between words, but not between a number and its unit; elsewhere as one line."""
     text = _wrapped(sentence, console.width, SPACES) if console.is_terminal else sentence
-    console.print(styled(text, style=style), soft_wrap=True)
+    console.print(styled(text, style=style), soft_wrap=not console.is_terminal)  # which breaks long words
 
 
 def _longest_piece(cells: Iterable[str]) -> int:

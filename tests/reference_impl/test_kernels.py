@@ -265,3 +265,10 @@ def test_kernels_of_other_numba_settings_are_compiled_anew(package, fall):
 def test_unwritable_cache_is_no_error(package, fall):
     (package / "a-file").write_text("")
     assert fall(package, NUMBA_CACHE_DIR=str(package / "a-file")) == ["-1.0", "0", "True"]
+
+
+def test_full_disk_is_no_error(package, fall):
+    """The index has room, and the kernel has not."""
+    full = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
+    assert fall(package, full + FALL) == ["-1.0", "0", "True"]
+    assert fall(package) == ["-1.0", "0", "True"]

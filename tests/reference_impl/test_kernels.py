@@ -270,5 +270,5 @@ def test_unwritable_cache_is_no_error(package, fall):
 def test_full_disk_is_no_error(package, fall):
     """The index has room, and the kernel has not."""
     full = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
-    assert fall(package, full + FALL) == ["-1.0", "0", "True"]
+    assert fall(package, FALL.replace("body = r.Body", f"{full}body = r.Body")) == ["-1.0", "0", "True"]  # all modules are imported
     assert fall(package) == ["-1.0", "0", "True"]

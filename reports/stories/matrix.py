@@ -89,16 +89,16 @@ def matrix_of(results: Results, statuses: Mapping[str, Mapping[str, Status]]) ->
 def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> str:
     """What each mark stands for, in the order of `GLOSSARY`; one mark stands for all known faults."""
     shown = sorted({status for by_engine in statuses.values() for status in by_engine.values()}, key=lambda status: status.reason)
-    parts = []
-    for outcome in GLOSSARY:
-        alike = [status for status in shown if status.outcome == outcome]
-        if outcome == "not judged":
-            words, head = [status.reason for status in alike], f"{outcome}: "
-        else:
-            words, head = [outcome if status.verdict == "known" else status.words for status in alike], ""
-        marks = dict.fromkeys(f"{status.mark} {word}" for status, word in zip(alike, words, strict=True))
-        parts += [head + ", ".join(marks)] * bool(marks)
-    return "; ".join(parts)
+
+    def words(status: Status) -> str:
+        if status.outcome == "not judged":
+            return status.reason
+        return status.outcome if status.verdict == "known" else status.words
+
+    of_each = {outcome: [status for status in shown if status.outcome == outcome] for outcome in GLOSSARY}
+    marks = {outcome: dict.fromkeys(f"{status.mark} {words(status)}" for status in alike) for outcome, alike in of_each.items()}
+    heads = {"not judged": "not judged: "}
+    return "; ".join(heads.get(outcome, "") + ", ".join(of_outcome) for outcome, of_outcome in marks.items() if of_outcome)
 
 
 def shown_scenes(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str], str]:

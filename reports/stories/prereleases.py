@@ -20,18 +20,18 @@ class Note(NamedTuple):
 def prereleases(measured: Mapping[str, Sequence[Release]]) -> Note:
     """The changes between the releases that were measured of each engine, oldest first."""
     compared = {engine: releases for engine, releases in measured.items() if len(releases) > 1}
-    changed = [engine for engine, releases in compared.items() if _sentences(engine, releases)]
-    parts = [part for engine in changed for part in _of_engine(engine, compared[engine])]
+    changed = {engine: sentences for engine, releases in compared.items() if (sentences := _sentences(engine, releases))}
+    parts = [part for engine, sentences in changed.items() for part in _of_engine(engine, compared[engine], sentences)]
     alike = [f"{engine}: no result changed from {_names(compared[engine])}." for engine in compared if engine not in changed]
     missing = [f"No prerelease after the newest release: {', '.join(engine for engine in measured if engine not in compared)}."]
     title = f"{counted(len(changed), 'engine')} of {len(compared)} with a prerelease changed"
     return Note(Document(title, [*parts, Sentences(alike + (missing if len(compared) < len(measured) else []))]), bool(changed))
 
 
-def _of_engine(engine: str, releases: Sequence[Release]) -> list[Part]:
+def _of_engine(engine: str, releases: Sequence[Release], sentences: Sequence[str]) -> list[Part]:
     chosen = " ".join(f"--release {release.name}" for release in releases)
     heading = Heading(f"{engine}, from {_names(releases)}", on_terminal=True)
-    return [heading, Sentences(_sentences(engine, releases)), Paragraph("To show it:", f"dropspin record --pre -e {engine} {chosen}")]
+    return [heading, Sentences(sentences), Paragraph("To show it:", f"dropspin record --pre -e {engine} {chosen}")]
 
 
 def _sentences(engine: str, releases: Sequence[Release]) -> list[str]:

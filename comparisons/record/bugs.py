@@ -174,9 +174,9 @@ def prepare(bugs: Iterable[Bug], folder: Path, on_done: Callable[[str], None]) -
             continue
         shutil.rmtree(place, ignore_errors=True)
         place.mkdir(parents=True)
-        own = load_plan().engines[engine]
+        planned = load_plan().engines[engine]
         try:
-            installed(place, own.package, own.requirements(release), Event())
+            installed(place, planned.package, planned.requirements(release), Event())
         except Breakdown as failure:
             on_done(f"{engine} {release}: {failure}")
             continue
@@ -207,17 +207,17 @@ def measure(bugs: Collection[Bug], folder: Path, *, jobs: int, on_done: Callable
     """
     stopping = Event()
     pieces = [(bug, release) for bug in bugs for release in bug.releases]
-    found: dict[tuple[str, str], Outcome] = {}
+    outcomes: dict[tuple[str, str], Outcome] = {}
     with ThreadPoolExecutor(jobs) as threads:
         try:
             for done in as_done(threads, lambda piece: _outcome(*piece, folder, stopping), iter(pieces), lambda: jobs):
                 if done is not None:
                     (bug, release), outcome = done
-                    found[bug.name, release] = outcome
+                    outcomes[bug.name, release] = outcome
                     on_done(bug, outcome)
         finally:
             stopping.set()
-    return {bug.name: [found[bug.name, release] for release in bug.releases] for bug in bugs}
+    return {bug.name: [outcomes[bug.name, release] for release in bug.releases] for bug in bugs}
 
 
 def _outcome(bug: Bug, release: str, folder: Path, stopping: Event) -> Outcome:

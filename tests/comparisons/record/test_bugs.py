@@ -92,9 +92,9 @@ def test_a_release_without_an_environment_costs_its_own_row(tmp_path):
 
 def test_an_environment_that_cannot_be_made_is_named_and_not_kept(tmp_path, monkeypatch):
     monkeypatch.setattr("dropspin.comparisons.record.environments.run", lambda command, stopping: (1, "ERROR: no such release"))
-    bug, told = load_bugs(["mujoco-rk4-second-order"])[0].model_copy(update={"releases": ("0.0.1",)}), []
-    prepare([bug], tmp_path, told.append)
-    assert told == ["mujoco 0.0.1: not installable: no such release"]
+    bug, messages = load_bugs(["mujoco-rk4-second-order"])[0].model_copy(update={"releases": ("0.0.1",)}), []
+    prepare([bug], tmp_path, messages.append)
+    assert messages == ["mujoco 0.0.1: not installable: no such release"]
     assert measure([bug], tmp_path, jobs=1, on_done=lambda *one: None)[bug.name][0].state == "not run"
 
 

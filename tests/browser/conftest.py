@@ -28,6 +28,9 @@ class Page:
         self.tab.on("pageerror", lambda error: self.messages.append(str(error)))
         self.tab.on("request", lambda request: self.requests.append(request.url))
         self.tab.goto(file.as_uri())
+        # Plots are drawn when their sizes are first observed, in the frame after the page has loaded.
+        if settings.get("java_script_enabled", True):
+            self.tab.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
     def start_replays(self, *scenes):
         """Open some scenes and their viewers, by default all, the last first, since a button disappears when it is pressed."""

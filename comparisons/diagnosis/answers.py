@@ -17,6 +17,8 @@ UNTURNED = 0.05  # rad
 TIPS = "tips or rolls"
 REBOUND, COEFFICIENT = "rebound / impact speed", "coefficient of the contact"
 """The quantities that have targets."""
+DECAY_TIME, KEPT = "1/e time", "fraction kept in 1 s"
+"""The quantities of a decay."""
 OF_FALLS, OF_SPINS = ("damping", "armature", "gravcomp"), ("damping", "armature")
 """Settings by which the exact solution with the settings in force differs from that without them."""
 
@@ -48,12 +50,14 @@ class Finding:
         settings: The names of the settings that cause it.
         remedies: What removes it.
         detail: A sentence's part that explains it.
+        shares: The shares of the settings that explain it, if several act; settings that do so only together as one, such as `a, b`.
     """
 
     kind: Kind
     settings: tuple[str, ...] = ()
     remedies: tuple[Remedy, ...] = ()
     detail: str = ""
+    shares: tuple[tuple[str, float], ...] = ()
 
     @property
     def is_error(self) -> bool:
@@ -94,6 +98,15 @@ class Answer:
     most: float = math.nan
     findings: tuple[Finding, ...] = ()
     detail: str = ""
+
+    @property
+    def effect(self) -> float:
+        """The measured value, and of a decay its rate [1/s]: quantities to which settings contribute in proportion."""
+        if self.quantity == DECAY_TIME:
+            return 1.0 / self.measured
+        if self.quantity == KEPT:
+            return -math.log(self.measured) if self.measured > 0.0 else math.inf
+        return self.measured
 
 
 def judged(

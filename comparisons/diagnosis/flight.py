@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, OF_FALLS, Answer, judged, vector_text
+from dropspin.comparisons.diagnosis.answers import DECAY_TIME, KEPT, NOTEWORTHY, OF_FALLS, Answer, judged, vector_text
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.diagnosis.parts import DIRECTIONS
 from dropspin.comparisons.engines.base import Diverged
@@ -53,13 +53,13 @@ def spin(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         tau = time_constant(SPEED, moments[number], facts.armature, *facts.spins[number])
         if tau < TURN:
             times = [_decay(body, start, dt, tau) for dt in dts]
-            slowed = Answer("spin", "1/e time", "s", direction, physical=math.inf)
+            slowed = Answer("spin", DECAY_TIME, "s", direction, physical=math.inf)
             answers.append(judged(body, slowed, dts, times, [tau] * len(dts)))
         else:
             ends = [_turned(body, start, dt) for dt in dts]
             kept = [float(np.linalg.norm(end[SPIN])) / SPEED for end in ends]
             exact = [facts.spun(number, SPEED, TURN) / SPEED] * len(dts)
-            answers.append(judged(body, Answer("spin", "fraction kept in 1 s", "1", direction, physical=1.0), dts, kept, exact))
+            answers.append(judged(body, Answer("spin", KEPT, "1", direction, physical=1.0), dts, kept, exact))
     return answers
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import OF_FALLS, TIPS, UNTURNED, WATCHED, Answer, Finding, judged
+from dropspin.comparisons.diagnosis.answers import KEPT, OF_FALLS, TIPS, UNTURNED, WATCHED, Answer, Finding, judged
 from dropspin.comparisons.diagnosis.landing import tilt
 from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
 from dropspin.scenarios.rotations import rotate, unrotate
@@ -101,7 +101,7 @@ def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         start = end.copy()
         start[VELOCITY], start[SPIN] = [1.0, 0.0, 0.0], [0.0, 0.0, -1.0 / radius]
         kept.append(body.motions(start[np.newaxis], dt, round(1.0 / dt), -facts.gravity * UP, floor=True)[0, -1, VELOCITY][0])
-    answer = Answer("roll", "fraction kept in 1 s", "1", speed=1.0, physical=1.0)
+    answer = Answer("roll", KEPT, "1", speed=1.0, physical=1.0)
     if facts.rolling or not facts.friction:
         return [replace(answer, measured=float(kept[0]))]
     heavy = facts.mass + facts.armature + (inertia + facts.armature) / radius**2

@@ -1,5 +1,6 @@
 """Remedies of findings: what removes them, tried on the body."""
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -8,6 +9,7 @@ from dropspin.comparisons.diagnosis.answers import COEFFICIENT, NOTEWORTHY, REBO
 from dropspin.comparisons.diagnosis.landing import rebound
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.running.ablation import shares
 
 HALVINGS = (1.0, 0.5, 0.25)
 SAFE = 0.85
@@ -57,9 +59,32 @@ def answers_to(question: Question, body: LooseBody) -> Iterator[Answer]:
         except Diverged:
             return []
 
+    @cache
+    def without(reverted: frozenset[str]) -> list[Answer]:
+        """The answers without the effects of some settings; none of a breakdown."""
+        try:
+            return question(body.changed({name: body.remedies[name][name] for name in reverted}), [dt])
+        except Diverged:
+            return []
+
     for number, answer in enumerate(answers):
-        findings = [_remedied(body, answer, finding, lambda *tried, n=number: again(*tried)[n : n + 1]) for finding in answer.findings]
+        explained = [_explained(body, finding, lambda names, n=number: without(names)[n : n + 1]) for finding in answer.findings]
+        findings = [_remedied(body, answer, finding, lambda *tried, n=number: again(*tried)[n : n + 1]) for finding in explained]
         yield replace(answer, findings=tuple(findings))
+
+
+def _explained(body: LooseBody, finding: Finding, without: Callable[[frozenset[str]], list[Answer]]) -> Finding:
+    """A finding of several settings with the one or two that explain it, if any do."""
+    known = [name for name in finding.settings if name in body.remedies]
+
+    def effect(reverted: frozenset[str]) -> float:
+        return next((answer.effect for answer in without(reverted)), math.nan)
+
+    explaining = shares(effect, known) if finding.kind == "setting" and len(known) > 1 else {}
+    if not explaining:
+        return finding
+    settings = tuple(dict.fromkeys(name for names in explaining for name in names))
+    return replace(finding, settings=settings, shares=tuple((", ".join(names), share) for names, share in explaining.items()))
 
 
 def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable[[tuple[str, ...], float], list[Answer]]) -> Finding:
@@ -75,7 +100,8 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
     if not found:
         return finding
     kind: Kind = "setting" if finding.kind == "model" and () not in found else finding.kind
-    return replace(finding, kind=kind, settings=next(iter(found)) or ("timestep",), remedies=tuple(found.values()))
+    settings = finding.settings if finding.shares else next(iter(found)) or ("timestep",)
+    return replace(finding, kind=kind, settings=settings, remedies=tuple(found.values()))
 
 
 def _tries(body: LooseBody, answer: Answer, finding: Finding) -> Iterator[tuple[tuple[str, ...], float]]:

@@ -13,7 +13,7 @@ from dropspin.comparisons.diagnosis.inertia import MOMENT
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis, Diagnosis
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
-from dropspin.reports.stories.numbers import formatted, grouped, in_ms, listed, with_unit
+from dropspin.reports.stories.numbers import explained_by, formatted, grouped, in_ms, listed, with_unit
 from dropspin.reports.stories.study import Study
 from dropspin.scenarios.text import counted
 
@@ -71,9 +71,10 @@ def _kind(finding: Finding) -> str:
 def _finding_cells(body: BodyDiagnosis, answer: Answer, finding: Finding | None) -> dict[str, str]:
     """The columns of a finding, empty for none."""
     if finding is None:
-        return {"finding": "", "settings": "", "remedies": "", "reason": ""}
+        return {"finding": "", "settings": "", "shares": "", "remedies": "", "reason": ""}
     remedies = "; ".join(_remedies((answer, finding)))
-    return {"finding": finding.kind, "settings": "; ".join(_settings(body, finding)), "remedies": remedies, "reason": finding.detail}
+    settings, shares = "; ".join(_settings(body, finding)), "; ".join(f"{name}: {share:.3g}" for name, share in finding.shares)
+    return {"finding": finding.kind, "settings": settings, "shares": shares, "remedies": remedies, "reason": finding.detail}
 
 
 def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
@@ -228,7 +229,8 @@ def _statement(pair: tuple[Answer, Finding]) -> str:
         return f"is {measured}, {finding.detail}" if measured else finding.detail
     wanted = in_force if finding.is_error and in_force else physical
     limit = f", {_value(answer.limit, answer.unit)} as dt → 0" if finding.kind == "time step" and math.isfinite(answer.limit) else ""
-    return f"is {measured}" + (f" instead of {wanted}" if wanted else "") + limit
+    shares = f" ({explained_by(dict(finding.shares), 'of the difference')})" if finding.shares else ""
+    return f"is {measured}" + (f" instead of {wanted}" if wanted else "") + limit + shares
 
 
 def _settings(body: BodyDiagnosis, finding: Finding) -> list[str]:

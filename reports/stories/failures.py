@@ -14,12 +14,10 @@ from dropspin.comparisons.regressions.causes import WrongParameter, causes
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.running.processes import ResourceLimits
 from dropspin.reports.document import Paragraph, Part, Sentences
-from dropspin.reports.stories.numbers import bound, formatted, grouped, in_ms, listed, step, subject, word
+from dropspin.reports.stories.numbers import bound, explained_by, formatted, grouped, in_ms, listed, step, subject, word
 from dropspin.scenarios.text import counted, rounded
 
 Row = Mapping[Hashable, Any]
-SEVERAL = 1.02
-"""Sum of shares from which on they are those of alternatives."""
 MOST_ON_PAGE, MOST_ON_TERMINAL = 24, 6
 """Largest number of sentences on the failures of one engine; JUnit, JSON and the report have all failures."""
 
@@ -137,22 +135,8 @@ def settings_that_explain(results: Results, engine: str) -> list[str]:
     for ((scene, metric, dt), rows), *others in alike.values():
         also = f"; the same settings in {listed([where for (where, *_), _ in others])}" if others else ""
         error = f"of the {subject(metric, 'truth', '')} at {in_ms(dt)}"
-        sentences.append(f"{scene}: {_with_shares(rows, error)}{also}.")
+        sentences.append(f"{scene}: {explained_by({row['truth']: row['value'] for row in rows}, error)}{also}.")
     return sentences
-
-
-def _with_shares(rows: Sequence[Row], error: str) -> str:
-    """The settings that explain an error, with their shares of it."""
-    names = [str(row["truth"]).replace(", ", " and ") for row in rows]
-    sizes = [f"{rounded(100.0 * row['value'], 3)} %" for row in rows]
-    explain = "explain" if ", " in rows[0]["truth"] else "explains"
-    if sum(row["value"] for row in rows) > SEVERAL:
-        return f"either {', or '.join(names)} {explain} {sizes[0]} {error}"
-    if explain == "explain":
-        return f"{names[0]} explain {sizes[0]} {error}, but only together"
-    return f"{names[0]} explains {sizes[0]} {error}" + "".join(
-        f", and {name} {size}" for name, size in zip(names[1:], sizes[1:], strict=True)
-    )
 
 
 def _described(wrong: WrongParameter) -> str:

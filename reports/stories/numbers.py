@@ -12,6 +12,8 @@ from dropspin.scenarios.text import counted, rounded
 
 MOST_NAMED = 3
 """Scenes, metrics or engines that a sentence names; of more it has the number."""
+SEVERAL = 1.02
+"""Sum of shares from which on they are those of alternatives."""
 Item = TypeVar("Item")
 Key = TypeVar("Key")
 
@@ -108,6 +110,19 @@ def grouped(items: Iterable[Item], key: Callable[[Item], Key]) -> dict[Key, list
 def left_out(reasons: Mapping[str, str]) -> list[str]:
     """A sentence for each engine that is left out of a study; a reason may be a sentence that begins with the engine's name."""
     return [f"Left out: {'' if why.startswith(label) else f'{label}, '}{why.removesuffix('.')}." for label, why in reasons.items()]
+
+
+def explained_by(shares: Mapping[str, float], error: str) -> str:
+    """The settings that explain an error, with their shares of it; two by one name, such as `a, b`, that do so only together."""
+    names, sizes = [name.replace(", ", " and ") for name in shares], [f"{rounded(100.0 * share, 3)} %" for share in shares.values()]
+    are_together = any(", " in name for name in shares)
+    explain = "explain" if are_together else "explains"
+    if sum(shares.values()) > SEVERAL:
+        return f"either {', or '.join(names)} {explain} {sizes[0]} {error}"
+    if are_together:
+        return f"{names[0]} explain {sizes[0]} {error}, but only together"
+    others = zip(names[1:], sizes[1:], strict=True)
+    return f"{names[0]} explains {sizes[0]} {error}" + "".join(f", and {name} {size}" for name, size in others)
 
 
 def step(dt: float) -> str:

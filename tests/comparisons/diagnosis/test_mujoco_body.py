@@ -15,6 +15,7 @@ from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
 from dropspin.comparisons.diagnosis.study import QUESTIONS
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.state import POSITION, UP
+from dropspin.scenarios.truths.settings import fall as damped_fall
 
 FREE = '<body name="b" pos="0 0 1"><freejoint/>{}</body>'
 PLANE = '<geom name="floor" type="plane" size="1 1 .1"/>'
@@ -287,9 +288,30 @@ def test_an_answer_has_a_finding_for_each_cause(tmp_path):
 def test_damping_and_armature_that_both_act_are_removed_together(tmp_path):
     world = '<body name="b" pos="0 0 1"><joint type="free" armature=".1" damping=".1"/><geom size=".1" mass="1"/></body>'
     [(_, found)] = findings_of(body_of(tmp_path, world), fall)
-    assert found.settings == ("damping",)
+    assert found.shares == (("damping, armature", pytest.approx(1.0)),)
     assert [remedy.text for remedy in found.remedies] == ["<freejoint/> (model.xml, line 1)"]
     assert found.remedies[0].value == pytest.approx(0.5 * 9.81 * 1.002, rel=1e-9)  # semi-implicit Euler
+
+
+@pytest.mark.parametrize(
+    ("armature", "damping", "option", "named"),
+    [
+        (0.1, 1e-5, "", ["armature"]),
+        (1e-4, 0.1, "", ["damping", "armature"]),
+        (0.1, 1.0, "", ["damping, armature"]),  # their own shares do not add up
+        (1e-6, 0.0, 'density="12" viscosity="1e-5"', ["density", "integrator"]),  # semi-implicit Euler falls g dt t/2 too far
+    ],
+)
+def test_settings_that_explain_a_difference_are_named_and_no_others(tmp_path, armature, damping, option, named):
+    """Of several that act, with the shares that the closed form of a damped fall has."""
+    joint = f'<joint type="free" armature="{armature}" damping="{damping}"/><geom size=".1" mass="1"/>'
+    body = body_of(tmp_path, f'<body name="b" pos="0 0 1">{joint}</body>', option)
+    [found] = [finding for _, finding in findings_of(body, fall) if finding.kind == "setting"]
+    assert [name for name, _ in found.shares] == named
+    if not option:
+        left = {"armature": (0.0, damping), "damping": (armature, 0.0), "damping, armature": (0.0, 0.0)}[named[0]]
+        free, whole, reverted = (float(damped_fall(1.0, 9.81, 1.0, *settings)[0]) for settings in ((0.0, 0.0), (armature, damping), left))
+        assert found.shares[0][1] == pytest.approx((reverted - whole) / (free - whole), abs=1e-3)
 
 
 def test_body_that_tips_over_has_a_row_that_says_so(tmp_path):

@@ -205,7 +205,7 @@ def _shown(*causes: tuple[Cause, bool]) -> tuple[Cause, ...]:
 def _of_offset(flights: Flights) -> Iterator[Finding]:
     """Of a centre of mass that is not where the header says."""
     header, found = flights.log.header, flights.moving
-    off = np.asarray(header.tracked_point) - header.body.centre - found.values[OFFSET]
+    off = header.tracked_from_centre - found.values[OFFSET]
     is_off = np.abs(off) > _half_widths(found)[OFFSET]
     if is_off.any():
         _, _, moved, error = rests(flights.log).scale()

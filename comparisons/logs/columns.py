@@ -119,8 +119,9 @@ def _parquet(raw: bytes, given: str) -> Columns:
     import pyarrow.parquet as pq
 
     file = pq.ParquetFile(io.BytesIO(raw))
-    _verify(given, file.schema_arrow.names, file.metadata.num_rows)
-    table = file.read()
+    names = [name for name in file.schema_arrow.names if not name.startswith("__index_level_")]  # pandas stores the index of a table so
+    _verify(given, names, file.metadata.num_rows)
+    table = file.read(names)
     # Decimals, which are integers with a unit of 0.1^n, are as small as integers and stay what their writer rounded to.
     decimals = {name for name in table.column_names if pa.types.is_decimal(table.schema.field(name).type)}
     return {name: (table[name].cast(pa.float64()) if name in decimals else table[name]).to_pandas() for name in table.column_names}

@@ -31,7 +31,6 @@ from dropspin.comparisons.logs.replay import (
     scene_of,
     time_step,
     tracked,
-    tracked_from_centre,
     usable,
 )
 from dropspin.comparisons.running.entries import engine_entries
@@ -223,7 +222,7 @@ def _errors(
         seen, header = tracked(one.header, result[0]), given[0].header
         t = one.launched.frames - one.launched.frames[:, :1]
         reference = np.repeat(nominal, DRAWS, axis=0) if one.what == "drawn starts" else measured
-        of_each = errors(header.body, header.gravity, tracked_from_centre(header), t, reference, seen)
+        of_each = errors(header.body, header.gravity, header.tracked_from_centre, t, reference, seen)
         if one.what == "as given":
             nominal = seen
         found[one.what] = of_each.reshape(len(measured), -1, len(KINDS)).mean(axis=1)

@@ -6,11 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from dropspin.comparisons.logs.flight import ACCELERATION, Flight, departures, falls, grown, positions
-from dropspin.comparisons.logs.log import Log, Toss
+from dropspin.comparisons.logs.log import Header, Log, Toss
 from dropspin.comparisons.logs.noise import Noise, Regression, end_of, regression
 from dropspin.comparisons.logs.rotors import Rotation, rotation, turn_by
-from dropspin.scenarios.rotations import multiply
+from dropspin.scenarios.ensemble import clearances
+from dropspin.scenarios.rotations import multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
+
+HIGH = 0.01
+"""Of the size of the body: how far it gets above the floor in a flight, at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +75,7 @@ class Flights:
     def starts(self) -> list[Start]:
         """The state at the end of each flight, by the header's gravity and centre of mass."""
         header = self.log.header
-        known = np.concatenate([[0.0, -header.gravity, 0.0], np.asarray(header.tracked_point) - header.body.centre])
+        known = np.concatenate([[0.0, -header.gravity, 0.0], header.tracked_from_centre])
         each = zip(self.found, self.rotations, self.moving.weights, self.turning.weights, strict=True)
         position, orientation = self.moving.noise, self.turning.noise
         return [
@@ -97,7 +101,7 @@ def _start(flight: Flight, known: Array, rotor: Rotation, position_noise: Noise,
 
 def flights_of(log: Log, acceleration: Array) -> Flights | None:
     """The flights of a recording whose free acceleration is about a given one [m/s²], shape (3,); None if no toss has one."""
-    flights = falls(log, acceleration)
+    flights = _above_floor(log.header, falls(log, acceleration))
     for _ in range(2):
         found = [flight for flight in flights if flight is not None]
         if not found:
@@ -108,6 +112,22 @@ def flights_of(log: Log, acceleration: Array) -> Flights | None:
     found = [flight for flight in flights if flight is not None]
     rotations = tuple(rotation(flight, log.header.body.inertia_tensor) for flight in found)
     return Flights(log, tuple(flights), shared_motion(found), rotations, regression([rotor.samples for rotor in rotations]))
+
+
+def _above_floor(header: Header, flights: list[Flight | None]) -> list[Flight | None]:
+    """The flights without those of bodies that stay on the floor or below it; all, if these are half: the floor is elsewhere then."""
+    if header.floor is None:
+        return flights
+    high = [None if flight is None else flight if _height(header, flight) > HIGH * header.body.size else None for flight in flights]
+    return high if 2 * high.count(None) < len(flights) + flights.count(None) else flights
+
+
+def _height(header: Header, flight: Flight) -> float:
+    """The largest height of the body's lowest point [m]."""
+    frames = slice(flight.first, flight.end)
+    position, orientation = flight.toss.position[frames], flight.toss.orientation[frames]
+    states = np.hstack([position - rotate(orientation, header.tracked_from_centre), orientation])
+    return float(clearances(states, header.body.vertices, header.body.semi_axes).max())
 
 
 def shared_motion(flights: Sequence[Flight]) -> Regression:

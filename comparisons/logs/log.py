@@ -93,6 +93,11 @@ class Header(Table):
     gravity: Positive = 9.81
     noise: Noise | None = None
 
+    @property
+    def tracked_from_centre(self) -> Array:
+        """The tracked point from the centre of mass, in the body frame [m], shape (3,)."""
+        return np.asarray(self.tracked_point, dtype=np.float64) - self.body.centre
+
 
 @dataclass(frozen=True, eq=False)
 class Toss:

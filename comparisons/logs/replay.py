@@ -90,7 +90,7 @@ def measured_scene(flights: Flights) -> Scenario | None:
         dt = time_step([start])
         states, earlier = _above_floor(scene, start, np.vstack([start.state, start.drawn(random, STARTS - 1)]), dt)
         orientation = start.toss.orientation[start.frame + 1 :]
-        position = start.toss.position[start.frame + 1 :] - rotate(orientation, tracked_from_centre(header))
+        position = start.toss.position[start.frame + 1 :] - rotate(orientation, header.tracked_from_centre)
         t = start.toss.t[start.frame + 1 :] - start.toss.t[start.frame] + earlier
         frames = {"t": t, "position": position, "orientation": orientation}
         rounded = {key: values.round(FRAME_DIGITS) for key, values in frames.items()}
@@ -231,15 +231,10 @@ def _at(motions: Array, steps: Array) -> Array:
     return found
 
 
-def tracked_from_centre(header: Header) -> Array:
-    """The tracked point from the centre of mass, in the body frame [m], shape (3,)."""
-    return np.array(header.tracked_point, dtype=np.float64) - header.body.centre
-
-
 def tracked(header: Header, found: Array) -> Array:
     """Poses of the tracked point from those of the centre of mass, shape (..., 7)."""
     moved = found.copy()
-    moved[..., POSITION] += rotate(found[..., ORIENTATION], tracked_from_centre(header))
+    moved[..., POSITION] += rotate(found[..., ORIENTATION], header.tracked_from_centre)
     return moved
 
 

@@ -57,8 +57,7 @@ def rests(log: Log) -> Rests:
     body, found = log.header.body, [toss for toss in log.tosses if _is_still(toss, log.header.body.size)]
     orientations = np.array([toss.orientation[-1] for toss in found]).reshape(-1, 4)
     heights = np.array([toss.position[-FEWEST_FRAMES:, 1].mean() for toss in found])
-    tracked = np.asarray(log.header.tracked_point) - body.centre
-    offsets = rotate(orientations[:, np.newaxis], body.vertices - tracked)[..., 1]
+    offsets = rotate(orientations[:, np.newaxis], body.vertices - log.header.tracked_from_centre)[..., 1]
     if not found:
         return Rests(orientations, heights, heights)
     lowest = offsets.min(axis=1, keepdims=True)

@@ -27,7 +27,7 @@ SMALLEST_STATED = 1e-4
 
 PARTS = ("angular_momentum_direction_error",)
 """Metrics that another metric contains."""
-UNDECIDED, MODEL_ERROR = "undecided", "model error"
+UNDECIDED, MODEL_ERROR = "trend undecided", "model error"
 """Reasons of a status that the verdict does not have: the time steps leave errors undecided; a known fault does not vanish as dt → 0."""
 COUNTED = ("known", "diverged", "crashed", "timed_out", "declined")
 """Verdicts that a title counts beside passed and failed checks."""

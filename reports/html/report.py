@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from dropspin.comparisons.judging.convergence import STUDIES
-from dropspin.comparisons.judging.verdicts import MARKS
+from dropspin.comparisons.judging.verdicts import MARKS, OUTCOMES
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
@@ -28,7 +28,7 @@ from dropspin.reports.stories import numbers
 from dropspin.reports.stories.contacts import worst_contacts
 from dropspin.reports.stories.error_budget import error_budgets
 from dropspin.reports.stories.impact_laws import NOTE
-from dropspin.reports.stories.matrix import GLOSSARY, leading_errors, legend_of_marks, step_times
+from dropspin.reports.stories.matrix import CHOICE, explanations, leading_errors, legend_of_marks, step_times
 from dropspin.reports.stories.run import Overview
 from dropspin.reports.stories.scene import left_out, modelled
 from dropspin.scenarios import reference_for
@@ -50,7 +50,6 @@ def html_report(
     failing = {failure.scene for failure in summary.failures}
     by_scene = enumerate(results.by_scene.items())
     scenes = [_scene(of_scene, number, charts.get(name, {}), name in failing) for number, (name, of_scene) in by_scene]
-    strips = {scene["strip"]: scene for scene in scenes if scene["strip"]}
     return page(
         "report.html",
         **vars(summary),
@@ -64,11 +63,12 @@ def html_report(
         steps=numbers.in_ms(float(finest[0])) if len(finest) == 1 else "",
         times=step_times(results),
         legend=legend_of_marks(summary.statuses),
-        glossary=GLOSSARY,
-        outcomes=[word for word in GLOSSARY if any(word == status.outcome for of in summary.statuses.values() for status in of.values())],
+        explanations=explanations(results, summary.statuses),
+        choice=CHOICE,
+        outcomes=list(dict.fromkeys(outcome for outcome, _ in OUTCOMES.values())),
         plotted=len(charts),
         scenes=scenes,
-        hero=strips.get(max(strips, key=lambda strip: (strip.shows_impact, len(strip.rows), strip.difference), default=None)),
+        hero=_hero(results, scenes),
         sections=sections,
         metrics=METRICS,
         ensemble_metrics=ENSEMBLE_METRICS,
@@ -76,6 +76,17 @@ def html_report(
         settings=first_settings(results.provenance),
         note_on_laws=NOTE,
     )
+
+
+def _hero(results: Results, scenes: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The scene of the picture at the top, with its film strip at the time step of the matrix; empty without motions."""
+    strips = {scene["strip"]: scene for scene in scenes if scene["strip"]}
+    if not strips:
+        return {}
+    scene = strips[max(strips, key=lambda strip: (strip.shows_impact, len(strip.rows), strip.difference))]
+    dt = min(dt for name, _, dt in results.trajectories if name == scene["name"])
+    motions = replay_of(results, scene["name"], dt)
+    return {**scene, "dt": dt, "strip": scene["strip"] if motions is None else strip_of(motions)}
 
 
 def _references(results: Results) -> str:

@@ -32,6 +32,8 @@ MERIDIANS = 24
 """Number of meridians of a drawn sphere."""
 MARK = 0.72
 """Share of white in the colour of the marked face of a body."""
+ZOOM = 1.2
+"""Size of the view relative to that of matplotlib, which leaves room for axes that are not drawn."""
 EXACT_COLOUR = "#202428"
 """Colour of the exact solution, which is drawn dashed."""
 
@@ -52,7 +54,7 @@ def write_clip(replay: Replay, file: str | Path, speed: float, on_progress: Call
     from matplotlib.figure import Figure
 
     times, writer = _frame_times(replay, speed), _writer(file)
-    figure = Figure(figsize=(6.4, 4.8), dpi=100)
+    figure = Figure(figsize=(5.6, 4.2), dpi=100)
     axes = _add_axes(figure, replay)
     shape = replay.scene.body.outline
     title = figure.suptitle("")
@@ -98,14 +100,14 @@ def _add_axes(figure: "Figure", replay: Replay) -> "Axes3D":
     """Add axes that show every motion, y up, with the floor, the walls and a legend."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    axes: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)
+    axes: Axes3D = figure.add_axes((0.0, 0.08, 1.0, 0.84), projection="3d", computed_zorder=False)
     size = replay.scene.body.size
     positions = np.concatenate([motion.frames.position for motion in replay.motions])
     positions = positions[replay.in_sight(positions)]
     low, high = positions.min(axis=0) - size, positions.max(axis=0) + size
     x, y, z = zip(low, high, strict=True)
     axes.set(xlim=x, ylim=(-z[1], -z[0]), zlim=y)
-    axes.set_aspect("equal")
+    axes.set_box_aspect((x[1] - x[0], z[1] - z[0], y[1] - y[0]), zoom=ZOOM)
     axes.view_init(elev=12.0, azim=-60.0)
     axes.set_axis_off()
     if replay.scene.floor is not None:

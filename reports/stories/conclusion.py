@@ -3,10 +3,9 @@
 import math
 from collections.abc import Sequence
 
-from dropspin.comparisons.judging.convergence import JUMPING
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.results.conclusion import ENOUGH, WITHIN, Answer, conclude
-from dropspin.comparisons.results.results import Results, is_undecided
+from dropspin.comparisons.results.results import UNDECIDED, Results
 from dropspin.reports.stories.matrix import step_times
 from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, named, quantity
 from dropspin.scenarios.text import counted
@@ -34,7 +33,7 @@ def conclusion(results: Results) -> list[str]:
 def _recommendation(answers: Sequence[Answer], within: float) -> str:
     """Which engines to use for a question that enough scenes test, the best first, and which not."""
     ordered = sorted(answers, key=lambda answer: (-len(answer.within), math.isnan(answer.cost), answer.cost))
-    used = [f"{answer.engine} {_steps(answer)}{_exceptions(answer)}{_declined(answer)}" for answer in ordered if answer.is_recommended]
+    used = [f"{answer.engine} {_steps(answer)}{_exceptions(answer)}{_absent(answer)}" for answer in ordered if answer.is_recommended]
     others = [
         f"{answer.engine} (within it in {len(answer.within)} of {answer.scenes} scenes)" for answer in ordered if not answer.is_recommended
     ]
@@ -94,10 +93,10 @@ def _exceptions(answer: Answer) -> str:
     return f"{except_}, undecided in {named(answer.undecided, 'scene')}" if answer.undecided else except_
 
 
-def _declined(answer: Answer) -> str:
+def _absent(answer: Answer) -> str:
     """The number of scenes in which an engine has no result."""
     count = answer.scenes - len(answer.within) - len(answer.beyond) - len(answer.undecided)
-    return f" (declines {counted(count, 'scene')})" if count else ""
+    return f" (no result in {counted(count, 'scene')})" if count else ""
 
 
 def _cost(results: Results) -> list[str]:
@@ -109,7 +108,8 @@ def _cost(results: Results) -> list[str]:
 
 
 def _undecided(results: Results) -> list[str]:
-    """A sentence on the errors of which the time steps do not show whether they vanish; none if there are none."""
-    errors = results.table[is_undecided(results.table) & ~results.table["metric"].isin(JUMPING)]
-    parts = [f"{engine} in {named(list(rows['scene'].unique()), 'scene')}" for engine, rows in errors.groupby("engine", sort=False)]
-    return [f"Undecided as dt → 0: {'; '.join(parts)}."] if parts else []
+    """A sentence on the scenes in which an engine has the mark ~; none if there are none."""
+    statuses = results.statuses().items()
+    marked = {engine: [scene for scene, by_engine in statuses if by_engine[engine].reason == UNDECIDED] for engine in results.engines}
+    parts = [f"{engine} in {named(scenes, 'scene')}" for engine, scenes in marked.items() if scenes]
+    return [f"Passed, but undecided whether each error vanishes as dt → 0 (~): {'; '.join(parts)}."] if parts else []

@@ -1,16 +1,17 @@
 """The matrix of a run, a row for each scene and a column for each engine: the scenes, the errors, the marks, and the time of the steps."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from dropspin.comparisons.judging.verdicts import VERDICTS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
-from dropspin.comparisons.results.results import UNDECIDED, Results, Status
-from dropspin.reports.stories.numbers import in_ms, quantity, short
+from dropspin.comparisons.results.results import MODEL_ERROR, UNDECIDED, Results, Status, is_undecided
+from dropspin.reports.stories.numbers import bound, capitalized, in_ms, quantity, short, sized, with_unit
 
 MOST_SCENES = 24
 """Largest number of rows on a terminal. Of more scenes, those in which no engine has a finding are left out first, then those with the
@@ -18,14 +19,29 @@ least severe findings.
 """
 WITHOUT_FINDING = frozenset({"passed", "measured", "declined", "no_truth"})
 
-GLOSSARY = {
-    "passed": "Every check is within its bound. Undecided: the time steps do not show whether each error vanishes as dt → 0.",
-    "failed": "A check is outside its bound, or the engine diverged, crashed, timed out or is broken.",
-    "known fault": "An error that the scene expects of this engine by name. Model error: it does not vanish as dt → 0.",
-    "not judged": "Measured without a bound; or a limitation that the adapter reports explains the error (limited), the engine or its "
-    "adapter cannot run the scene (declined), the engine is not installed (missing), or no reference is known.",
+MEANINGS = {
+    "passed": "every check is within its bound; a large error passes if it has no bound at this time step and vanishes as dt → 0",
+    f"passed ({UNDECIDED})": "every check is within its bound, but the time steps do not show whether each error vanishes as dt → 0",
+    "failed": "a check is outside its bound",
+    "failed (diverged)": "a state was not finite, or the engine reported a breakdown",
+    "failed (crashed)": "the process of the engine ended",
+    "failed (timed out)": "the engine exceeded the time limit",
+    "failed (broken)": "the adapter cannot be loaded",
+    "known fault": "an error that the scene expects of this engine by name",
+    f"known fault ({MODEL_ERROR})": "an error that the scene expects of this engine by name, and that does not vanish as dt → 0",
+    "not judged (limited)": "a check, perhaps of another metric, fails, and a known limitation of the engine explains an error this large",
+    "not judged (measured)": "the results have no bounds",
+    f"not judged ({UNDECIDED})": "the results have no bounds, and the time steps do not show whether each error vanishes as dt → 0",
+    "not judged (no exact solution)": "there is no exact solution to compare with",
+    "not judged (declined)": "the engine or its adapter cannot run the scene",
+    "not judged (missing)": "the engine is not installed",
 }
-"""The outcomes that readers see, and what they mean for an engine in a scene: the worst over all metrics and time steps."""
+"""What each status of an engine in a scene means; the status is the worst over all metrics and time steps."""
+CHOICE = (
+    "Error: in the metric with the largest known fault, limitation or failure of the scene; without one, in bounce height, else "
+    "orientation, else position."
+)
+"""Which error a row of the matrix shows."""
 
 
 @dataclass(frozen=True)
@@ -83,22 +99,45 @@ def matrix_of(results: Results, statuses: Mapping[str, Mapping[str, Status]]) ->
         sizes = errors.sizes if errors else {}
         values = {engine: f"{status.mark} {sizes.get(engine, '')}".rstrip() for engine, status in statuses[scene].items()}
         rows.append({"scene": scene, title: errors.title if errors else "", **values})
-    return rows, list(filter(None, [legend_of_marks({scene: statuses[scene] for scene in scenes}), left_out]))
+    legend = legend_of_marks({scene: statuses[scene] for scene in scenes})
+    return rows, list(filter(None, [*(f"{words}: {meaning}" for words, meaning in legend.items()), CHOICE, left_out]))
 
 
-def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> str:
-    """What each mark stands for, in the order of `GLOSSARY`; one mark stands for all known faults."""
-    shown = sorted({status for by_engine in statuses.values() for status in by_engine.values()}, key=lambda status: status.reason)
+def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> dict[str, str]:
+    """What each status of a run means, by its mark and words, in the order of `MEANINGS`."""
+    shown = {status.words: status.mark for by_engine in statuses.values() for status in by_engine.values()}
+    return {f"{shown[words]} {words}": meaning for words, meaning in MEANINGS.items() if words in shown}
 
-    def words(status: Status) -> str:
-        if status.outcome == "not judged":
-            return status.reason
-        return status.outcome if status.verdict == "known" else status.words
 
-    of_each = {outcome: [status for status in shown if status.outcome == outcome] for outcome in GLOSSARY}
-    marks = {outcome: dict.fromkeys(f"{status.mark} {words(status)}" for status in alike) for outcome, alike in of_each.items()}
-    heads = {"not judged": "not judged: "}
-    return "; ".join(heads.get(outcome, "") + ", ".join(of_outcome) for outcome, of_outcome in marks.items() if of_outcome)
+def explanations(results: Results, statuses: Mapping[str, Mapping[str, Status]]) -> dict[str, dict[str, str]]:
+    """Why an engine has its status, by scene and engine: the error of the matrix with its bound, and the reason."""
+    return {
+        scene: {engine: _explanation(of_scene, scene, engine, statuses[scene][engine]) for engine in results.engines}
+        for scene, of_scene in results.by_scene.items()
+    }
+
+
+def _explanation(results: Results, scene: str, engine: str, status: Status) -> str:
+    mine, errors = results.table[results.table["engine"] == engine], results.leading_errors(scene)
+    metric = str(errors["metric"].iloc[0]) if len(errors) else ""
+    sentences = [_with_bound(metric, row) for row in errors[errors.index == engine].to_dict("records")]
+    if status.words == "passed":
+        trends = mine[(mine["kind"] == "asymptotic_error") & (mine["metric"] == metric)]
+        sentences += ["every check of the scene is within its bound", *(f"as dt → 0: {reason}" for reason in trends["reason"])]
+    else:
+        decisive = mine[is_undecided(mine) if status.reason == UNDECIDED else mine["verdict"] == status.verdict]
+        order = decisive["metric"].map({metric: 0, "": 2}).fillna(1)
+        first = decisive.loc[order.sort_values(kind="stable").index[:1]].to_dict("records")
+        reasons = [f"{quantity(row['metric'])}: {row['reason']}".removeprefix(": ") for row in first]
+        sentences += [f"{status.words}: {MEANINGS[status.words]}", *filter(None, reasons)]
+    return capitalized("; ".join(sentences))
+
+
+def _with_bound(metric: str, row: Mapping[Hashable, Any]) -> str:
+    percent = row["unit"] == "1"
+    allowed = bound(*(row[end] * (100.0 if percent else 1.0) for end in ("lower", "upper")))
+    limits = f"bound {with_unit(allowed, '%' if percent else row['unit'])}" if allowed else "no bound at this time step"
+    return f"{quantity(metric)} {sized(abs(row['value']), row['unit'])} at {in_ms(row['dt'])}, {limits}"
 
 
 def shown_scenes(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str], str]:

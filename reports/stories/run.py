@@ -21,7 +21,7 @@ from dropspin.reports.stories.findings import (
     verdict_sentence,
 )
 from dropspin.reports.stories.impact_laws import NOTE, law_rows
-from dropspin.reports.stories.matrix import matrix_of
+from dropspin.reports.stories.matrix import legend_of_marks, matrix_of
 from dropspin.scenarios.text import counted
 
 
@@ -92,6 +92,7 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = ()) -
         Table(matrix, [*reversed(results.engines)], on_page=False),
         Sentences(notes, style="dim", on_page=False),
         Table(statuses, on_terminal=False),
+        Sentences([f"{words}: {meaning}" for words, meaning in legend_of_marks(summary.statuses).items()], on_terminal=False),
         *(replace(part, on_terminal=False) for part in laws),
         listed,
         *(replace(part, on_page=False) for part in failure_parts(results, unexpected)),

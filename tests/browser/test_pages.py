@@ -229,15 +229,15 @@ def test_filters_hide_scenes_and_engines_and_count_the_rest(opened, results):
     assert shown.inner_text() == f"{len(boxes)} of {len(results.scenes)} scenes"
     assert sections.count() == tab.locator("#matrix tbody tr[data-scene]:visible").count() == len(boxes) > 2
     tab.get_by_role("searchbox").fill("")
-    tab.locator("#filters").get_by_label("Status").select_option("failed")
+    tab.locator("#filters").get_by_label("Outcome").select_option("failed")
     assert [one.get_attribute("data-scene") for one in sections.all()] == ["drop-<b>failing</b>"]
-    tab.locator("#filters").get_by_label("Status").select_option(LIMITED)
+    tab.locator("#filters").get_by_label("Outcome").select_option(LIMITED)
     tab.get_by_role("checkbox", name="wang").uncheck()
     found = overview(results).statuses
     left = {scene for scene, of in found.items() if LIMITED in (of["mujoco"].outcome, of["pybullet"].outcome)}
     assert {one.get_attribute("data-scene") for one in sections.all()} == left
     assert 0 < len(left) < len(results.scenes)
-    tab.locator("#filters").get_by_label("Status").select_option("")
+    tab.locator("#filters").get_by_label("Outcome").select_option("")
     assert sections.count() == len(results.scenes)
     assert tab.locator("[data-engine='0']:visible").count() == 0
     assert tab.locator("[data-engine='1']:visible").count() > 0

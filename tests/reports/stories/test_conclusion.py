@@ -94,7 +94,7 @@ STEP = r"at (?:(?P<any>any step tried)|(?P<dt>\S+) ms(?P<less> or less)?|the fin
 SAID = re.compile(rf"(?P<no>not |undecided for )?(?P<engines>.+?)(?: {STEP}| \((?P<size>\S+) (?:%|rad)\))?(?: in (?P<scenes>.+))?")
 USED = re.compile(
     rf"{STEP}(?:, except (?:with (?P<condition>.+) \((?P<covered>\d+) scenes\))?(?: and )?(?:in (?P<named>.+?))?)?"
-    r"(?:, undecided in (?P<undecided>.+?))?(?: \(declines (?P<declined>\d+) scenes?\))?"
+    r"(?:, undecided in (?P<undecided>.+?))?(?: \(no result in (?P<absent>\d+) scenes?\))?"
 )
 
 
@@ -122,7 +122,7 @@ def verify_use(run, metric, engine, clause):
     rest = kinds["beyond"] - covered
     assert named(said["named"], rest) if rest else said["named"] is None
     assert named(said["undecided"], kinds["undecided"]) if kinds["undecided"] else said["undecided"] is None
-    assert int(said["declined"] or 0) == len(tested) - len(finest)
+    assert int(said["absent"] or 0) == len(tested) - len(finest)
 
 
 def verify_count(run, metric, engine, within, scenes):

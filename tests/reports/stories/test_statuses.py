@@ -1,13 +1,16 @@
 """One status for each engine in each scene, and known faults in every count."""
 
+import re
+
 import numpy as np
 import pytest
 from support import engines as made
 
 import dropspin as ds
 from dropspin.comparisons.judging.verdicts import OUTCOMES, VERDICTS
+from dropspin.comparisons.results.results import MODEL_ERROR, UNDECIDED, Status
 from dropspin.reports.junit import junit_xml
-from dropspin.reports.stories.matrix import GLOSSARY
+from dropspin.reports.stories.matrix import MEANINGS, explanations
 from dropspin.reports.stories.run import overview
 
 
@@ -31,9 +34,36 @@ def test_engine_has_one_status_in_a_scene(core, scene, engine, verdict, reason, 
     assert (*status, status.words) == (verdict, reason, words)
 
 
-def test_every_verdict_has_an_outcome_of_the_glossary():
-    assert {verdict: OUTCOMES[verdict][0] for verdict in VERDICTS}.keys() == OUTCOMES.keys()
-    assert {outcome for outcome, _ in OUTCOMES.values()} == GLOSSARY.keys()
+def test_every_status_has_a_meaning():
+    statuses = [Status(verdict, reason) for verdict, (_, reason) in OUTCOMES.items()]
+    statuses += [Status("passed", UNDECIDED), Status("measured", UNDECIDED), Status("known", MODEL_ERROR)]
+    assert OUTCOMES.keys() == set(VERDICTS)
+    assert {status.words for status in statuses} == MEANINGS.keys()
+
+
+@pytest.mark.parametrize(
+    ("scene", "engine", "pattern"),
+    [
+        ("rock-block", "pybullet", r"Angular momentum 3\.\d+ % at 1 ms, bound ≤ 10 %; every check of the scene .*; as dt → 0: falls .*"),
+        ("drop-ball-slipping", "pybullet", r"Bounce height 0\.\d+ % at 1 ms, no bound at this time step; every check .*; as dt → 0: .*"),
+        (
+            "drop-box-turning",
+            "pybullet",
+            r"Bounce height 0\.\d+ % at 1 ms, .*; not judged \(limited\): .*; friction cone excess: .*",
+        ),
+        (
+            "spin-asymmetric",
+            "wang",
+            r"Orientation 2\.67 rad at 1 ms, bound 2\.6 … 2\.75 rad; known fault \(model error\): .*; orient.*",
+        ),
+        ("rock-block", "mujoco", r"Angular momentum 3\.\d+ % at 1 ms, bound ≤ 10 %; passed \(trend undecided\): .*; .*: .*"),
+        ("slide-box", "wang", r"Not judged \(declined\): the engine or its adapter cannot run the scene; law=note has no Coulomb .*"),
+    ],
+)
+def test_explanation_has_the_error_its_bound_and_the_reason(core, scene, engine, pattern):
+    """Also where the check that decides is of another metric than the error shown."""
+    found = explanations(core, core.statuses())[scene][engine]
+    assert re.fullmatch(pattern, found), found
 
 
 def test_failure_is_the_status_of_its_scene():

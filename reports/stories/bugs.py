@@ -74,8 +74,8 @@ def _row(bug: Bug, outcome: Outcome) -> dict[str, str]:
 def _said(bug: Bug, outcomes: Sequence[Outcome]) -> list[str]:
     """What the command printed in the newest release that shows the fault, or why nothing; and why releases were not run."""
     shown = [outcome for outcome in outcomes if outcome.state == "shown"]
-    printed = [f"Printed: {shown[-1].said}" if shown[-1].said else "No failed check is printed."] if shown else []
-    silent = [f"Not by the unchanged catalogue: {bug.silent}."] if bug.silent else []
+    printed = [f"Failed check: {shown[-1].said}" if shown[-1].said else "No check fails."] if shown else []
+    silent = [f"The unchanged catalogue does not show it: {bug.silent}."] if bug.silent else []
     return [*printed, *silent, *(f"{outcome.release}: {outcome.said}." for outcome in outcomes if outcome.state == "not run")]
 
 
@@ -93,7 +93,7 @@ def _summary(verdicts: Sequence[tuple[Bug, Verdict]]) -> str:
     parts = {
         "shown": kinds["shown"] + kinds["fixed"],
         "of these fixed in a later release": kinds["fixed"],
-        "by the unchanged catalogue": catalogue,
+        "of these by the unchanged catalogue": catalogue,
     }
     others = {kind: kinds[kind] for kind in ("not shown", "not expressible", "not run") if kinds[kind]}
     return f"{counted(len(verdicts), 'case')}: {', '.join(f'{count} {name}' for name, count in (parts | others).items())}."

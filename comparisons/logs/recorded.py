@@ -10,11 +10,14 @@ from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.log import UPRIGHT, Cause, Finding, Header, Log, Toss
 from dropspin.comparisons.logs.rest import level_share
 from dropspin.comparisons.logs.rotors import rotation
+from dropspin.comparisons.running.belonging import missing_frames
 from dropspin.scenarios.rotations import conjugate, length, multiply, rotate, unrotate
 from dropspin.scenarios.state import Array
 
 MOST_ROTORS = 8
 """Flights whose rotation is tried in other readings."""
+DEGREE, BETTER = 5, 1.02
+"""Degree of the polynomials that compare times with equal steps. Uneven times are right unless equal steps fit by this factor better."""
 
 
 def _read_as(toss: Toss, header: Header, rolled: int, inverse: bool) -> Toss:
@@ -79,9 +82,22 @@ def of_spins(flights: Flights) -> Iterator[Finding]:
         yield Finding("spin", error(given), 0.0, causes=(cause,) if error(best) < 0.3 * error(given) else ())
 
 
+def _residual(flights: Flights, *, equal_steps: bool) -> float:
+    """Sum of squares that a polynomial leaves of the positions in flight, over the recorded times or over equal steps [m²]."""
+    total = 0.0
+    for flight in flights.found:
+        steps = np.diff(flight.toss.t[flight.first : flight.end])
+        frames = 1 + missing_frames(steps) if equal_steps else steps
+        t = np.concatenate([[0.0], np.cumsum(frames)])
+        position = flight.toss.position[flight.first : flight.end]
+        total += float(np.polynomial.chebyshev.chebfit(2.0 * t / t[-1] - 1.0, position, DEGREE, full=True)[1][0].sum())
+    return total
+
+
 def of_frames(flights: Flights) -> Iterator[Finding]:
     """Of frames that are missing or repeated, of tosses without a flight, and of what the file shows by itself."""
-    yield from flights.log.irregularities
+    times_are_right = _residual(flights, equal_steps=False) <= BETTER * _residual(flights, equal_steps=True)
+    yield from (finding for finding in flights.log.irregularities if finding.kind != "jitter" or not times_are_right)
     for toss, flight in zip(flights.log.tosses, flights.flights, strict=True):
         if flight is None:
             yield Finding("no flight", 0.0, FEWEST_FRAMES, toss.name)

@@ -54,7 +54,7 @@ REMEDIES = {
     "no flight": "record from the release on",
     "frame dropped": "give the times in a column t",
     "repeated": "leave out rows that were not measured",
-    "jitter": "give the time of each frame without rounding; or, if the camera is even, no t but rate",
+    "jitter": "give the exact time of each frame; or, if the frames are evenly spaced, leave out the column t and give rate in the header",
     "rate": "multiply the times t by {ratio:.4g}",
     "axes": "turn the axes by a level tag on the floor",
     "push": "film without wind and strings",

@@ -116,6 +116,22 @@ def test_a_missing_frame_is_named_with_its_place() -> None:
     assert (found.kind, found.toss, found.value, found.frame) == ("frame dropped", "3", 1, 7)
 
 
+def test_uneven_times_are_a_finding_unless_the_body_moved_at_these_times() -> None:
+    log = sound()
+    rng = np.random.default_rng(5)
+    uneven = {toss.name: toss.t + np.concatenate([[0.0], rng.uniform(-1e-3, 1e-3, len(toss) - 1)]) for toss in log.tosses}
+    irregular = replace(log, irregularities=(Finding("jitter", 0.008, 1 / 148, "0", 3),))
+
+    def kinds(wrong: Log) -> set[str]:
+        return {finding.kind for finding in log_check(wrong).findings}
+
+    def moved(toss: Toss) -> np.ndarray:
+        return np.stack([np.interp(uneven[toss.name], toss.t, along) for along in toss.position.T], axis=1)
+
+    assert "jitter" in kinds(changed(irregular, t=lambda toss: uneven[toss.name]))
+    assert "jitter" not in kinds(changed(irregular, t=lambda toss: uneven[toss.name], position=moved))
+
+
 def test_a_spin_in_the_body_frame_is_named() -> None:
     with_spin = changed(sound(), angular_velocity=lambda toss: np.zeros((len(toss), 3)))
     check = log_check(with_spin)

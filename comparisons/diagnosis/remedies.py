@@ -68,18 +68,18 @@ def answers_to(question: Question, body: LooseBody) -> Iterator[Answer]:
             return []
 
     for number, answer in enumerate(answers):
-        explained = [_explained(body, finding, lambda names, n=number: without(names)[n : n + 1]) for finding in answer.findings]
+
+        def effect(reverted: frozenset[str], n: int = number) -> float:
+            return next((other.effect for other in without(reverted)[n : n + 1]), math.nan)
+
+        explained = [_explained(body, finding, effect) for finding in answer.findings]
         findings = [_remedied(body, answer, finding, lambda *tried, n=number: again(*tried)[n : n + 1]) for finding in explained]
         yield replace(answer, findings=tuple(findings))
 
 
-def _explained(body: LooseBody, finding: Finding, without: Callable[[frozenset[str]], list[Answer]]) -> Finding:
+def _explained(body: LooseBody, finding: Finding, effect: Callable[[frozenset[str]], float]) -> Finding:
     """A finding of several settings with the one or two that explain it, if any do."""
     known = [name for name in finding.settings if name in body.remedies]
-
-    def effect(reverted: frozenset[str]) -> float:
-        return next((answer.effect for answer in without(reverted)), math.nan)
-
     explaining = shares(effect, known) if finding.kind == "setting" and len(known) > 1 else {}
     if not explaining:
         return finding

@@ -77,7 +77,7 @@ def tradeoff(
 
     Raises:
         DropspinError: The scene has no exact solution, or the metric does not apply to it; the budget or a number of worlds is not above 0;
-            or no engine runs the scene.
+            or no engine can be compared in the scene.
     """
     sizes = tuple(sorted(set(worlds)))
     if not all(isinstance(size, int) and 0 < size <= MOST_WORLDS for size in sizes):
@@ -114,7 +114,7 @@ def tradeoff(
     result = TradeOff(scene, chosen, points, tuple(ladders), sizes, memory, others)
     if not points:
         reasons = "; ".join(f"{label}: {why.removesuffix('.')}" for label, why in result.left_out.items())
-        raise DropspinError(f"no engine runs {scene.name}: {reasons}.")
+        raise DropspinError(f"no engine can be compared in {scene.name}: {reasons}.")
     return result
 
 

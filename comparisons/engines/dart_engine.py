@@ -1,6 +1,5 @@
 """The engine `dart`: DART's free joint over a half-space. DART solves contacts after gravity has acted, hence v+ = e (u + g dt)."""
 
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import dartpy as dart
@@ -8,6 +7,7 @@ import numpy as np
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, KnownLimitation, Simulation
+from dropspin.comparisons.engines.dart_settings import OFF_ON, REASONS, SETTINGS
 from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.bodies import Box
@@ -16,15 +16,7 @@ from dropspin.scenarios.rotations import cross, rotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, Array
 from dropspin.scenarios.surfaces import Floor
 
-REASONS = {
-    "deactivation": "never falls asleep; else a block that tips over more slowly than 0.05 rad/s stops halfway",
-    "collision_detector": "finds all corners on the half-space; the default, FCL, finds one, and an edge rebounds with 0.217, not 0.5",
-    "split_impulse": "corrects depth without changing velocities; else a ball of restitution 0 rebounds at 1 mm/s, at any step",
-    "lcp_solver": "Coulomb's cone, to 1e-8 m/s, for a coefficient; with the default pyramid a turning box loses or gains 0.23 of its spin",
-    "restitution": "e + (1 + e) 1e-5: DART's contacts are compliant by 1e-5, which Python cannot set; uncorrected, 0.5 becomes 0.499985",
-    "friction": "the scene's coefficient; 1e6 where the floor grips (1e2 to 1e9 give the same)",
-}
-"""Effects were measured on balls dropped from 1 m and boxes on an edge, tipping and turning flat, without the one setting."""
+DETECTORS = {"dart": "DARTCollisionDetector", "bullet": "BulletCollisionDetector", "ode": "OdeCollisionDetector"}
 
 
 class Dart(Engine):
@@ -34,6 +26,7 @@ class Dart(Engine):
     shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
+    settings: ClassVar = SETTINGS
 
     def discretisation(self, scene: Scenario) -> str | None:
         """Free flight agrees with MuJoCo's Euler to 1e-13 (to 1e-7 below 1e-3 rad a step, where DART truncates a series)."""
@@ -47,21 +40,32 @@ class Dart(Engine):
         return unfit or mapping.refusal_of_rest_speed(scene, "DART", "it sets rebounds below 0.1 m/s to 0")
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return DartSimulation(scene, dt, {name: self.option(name) for name in self.choices})
+        return DartSimulation(scene, dt, self)
+
+    def chosen(self, floor: Floor) -> dict[str, Any]:
+        """The settings for a floor."""
+        restitution, friction = floor.restitution, mapping.friction_of(floor, gripping=1e6)
+        world = {name: setting.default for name, setting in SETTINGS.items() if setting.values}
+        if not self.is_default:
+            restitution = min(1.0, restitution + (1.0 + restitution) * 1e-5)
+            world |= {name: SETTINGS[name].calibrated for name in world if not SETTINGS[name].is_computed}
+            world["lcp_solver"] = "dantzig" if isinstance(floor.friction, str) else "nsgs"
+        surfaces = {"restitution": restitution, "friction": friction, "floor_restitution": 1.0, "floor_friction": friction}
+        return world | surfaces | self.given
 
 
 class DartSimulation(Simulation):
     """A DART world with the body's skeleton and, if the scene has a floor, the floor's."""
 
-    def __init__(self, scene: Scenario, dt: float, form: Mapping[str, str]) -> None:
+    def __init__(self, scene: Scenario, dt: float, engine: Dart) -> None:
         self.velocity_lag = 0.5 * dt
         self._scene, self._world = scene, dart.simulation.World()
         self._world.setTimeStep(dt)
         self._world.setGravity(scene.acceleration)
-        self.settings = {"version": version("dartpy"), **form}
+        self.settings = {"version": version("dartpy"), **{name: engine.option(name) for name in engine.choices}}
         if scene.floor is not None:
-            self.settings |= self._add_floor(scene.floor, form["floor"], is_calibrated=form["profile"] == "calibrated")
-        self._body, *_ = [self._add_body(one) for one in mapping.bodies_in(scene, form["beside"])]
+            self.settings |= self._add_floor(engine.option("floor"), engine.chosen(scene.floor))
+        self._body, *_ = [self._add_body(one) for one in mapping.bodies_in(scene, engine.option("beside"))]
 
     def _add_body(self, scene: Scenario) -> Any:
         skeleton, mounting = dart.dynamics.Skeleton(f"body {self._world.getNumSkeletons()}"), dart.math.Isometry3()
@@ -83,29 +87,31 @@ class DartSimulation(Simulation):
         self._world.addSkeleton(skeleton)
         return body
 
-    def _add_floor(self, floor: Floor, kind: str, *, is_calibrated: bool) -> dict[str, Any]:
+    def _add_floor(self, kind: str, chosen: dict[str, Any]) -> dict[str, Any]:
+        """Set the world's settings and add the floor; the settings, those of the world read back."""
         solver, sleep = self._world.getConstraintSolver(), dart.simulation.DeactivationOptions()
-        friction, restitution = mapping.friction_of(floor, gripping=1e6), floor.restitution
-        if is_calibrated:
-            sleep.mEnabled = False
-            self._world.setDeactivationOptions(sleep)
-            self._world.setCollisionDetector(dart.collision.OdeCollisionDetector())
-            solver.setSplitImpulseEnabled(True)
-            restitution = min(1.0, restitution + (1.0 + restitution) * 1e-5)
-            if not isinstance(floor.friction, str):
-                options = dart.constraint.NsgsFrictionSolver.Options()
-                options.tolerance = 1e-8
-                solver.setBoxedLcpSolver(dart.constraint.NsgsFrictionSolver(options))
+        sleep.mEnabled = chosen["deactivation"] == "true"
+        self._world.setDeactivationOptions(sleep)
+        if chosen["collision_detector"] in DETECTORS:
+            self._world.setCollisionDetector(getattr(dart.collision, DETECTORS[chosen["collision_detector"]])())
+        solver.setSplitImpulseEnabled(chosen["split_impulse"] == "true")
+        if chosen["lcp_solver"] == "nsgs":
+            options = dart.constraint.NsgsFrictionSolver.Options()
+            options.tolerance = 1e-8
+            solver.setBoxedLcpSolver(dart.constraint.NsgsFrictionSolver(options))
+        elif chosen["lcp_solver"] == "pgs":
+            solver.setBoxedLcpSolver(dart.constraint.PgsBoxedLcpSolver())
         ground, half = dart.dynamics.Skeleton("floor"), np.full(3, FLOOR_HALF_SIZE)
         shape = dart.dynamics.BoxShape(2.0 * half) if kind == "box" else dart.dynamics.PlaneShape([0.0, 1.0, 0.0], 0.0)
-        # DART multiplies the two restitutions and uses the smaller friction.
-        part = _add_shape(ground.createWeldJointAndBodyNodePair()[1], shape, 1.0, friction)
+        surface = chosen["floor_restitution"], chosen["floor_friction"]
+        part = _add_shape(ground.createWeldJointAndBodyNodePair()[1], shape, *surface)
         if kind == "box":
             part.setRelativeTranslation([0.0, -FLOOR_HALF_SIZE, 0.0])
         self._world.addSkeleton(ground)
-        detector, lcp = self._world.getCollisionDetector().getType(), solver.getBoxedLcpSolver().getType()
-        solved = {"collision_detector": detector, "lcp_solver": lcp, "split_impulse": solver.isSplitImpulseEnabled()}
-        return solved | {"deactivation": self._world.getDeactivationOptions().mEnabled, "restitution": restitution, "friction": friction}
+        lcp = solver.getBoxedLcpSolver().getType().removesuffix("BoxedLcpSolver").removesuffix("FrictionSolver").lower()
+        switches = solver.isSplitImpulseEnabled(), self._world.getDeactivationOptions().mEnabled
+        found = {"collision_detector": self._world.getCollisionDetector().getType(), "lcp_solver": lcp}
+        return chosen | found | dict(zip(("split_impulse", "deactivation"), (OFF_ON[is_on] for is_on in switches), strict=True))
 
     def advance(self, steps: int) -> None:
         for _ in range(steps):

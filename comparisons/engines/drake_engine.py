@@ -1,7 +1,6 @@
 """The engine `drake`: Drake's discrete plant, a body's corners over a half-space. Its contacts are damped so that restitution is 0."""
 
 import logging
-from collections.abc import Mapping
 from itertools import product
 from typing import Any, ClassVar
 
@@ -15,6 +14,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
+from dropspin.comparisons.engines.drake_settings import PLANT, REASONS, SETTINGS
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import ORIENTATION, Array
@@ -23,15 +23,6 @@ from dropspin.scenarios.surfaces import Floor
 logging.getLogger("drake").addFilter(lambda record: "half spaces" not in record.getMessage())  # a warning about deformable bodies
 
 LONGEST = 1e150
-REASONS = {
-    "discrete_contact_approximation": "tamsi for a coefficient, else sap; the default, lagged, with this dissipation stops a sliding box",
-    "sap_near_rigid_threshold": "at the default 1, a flat box rests 0.3 mm deep instead of 0.014, and a rocking block's error doubles",
-    "relaxation_time": "s, for sap; a body leaves the floor at depth over this; at the default 0.1 a ball rebounds at 10 mm/s instead of 1",
-    "dissipation": "s/m, for tamsi; the remaining rebound speed is 1 over this; at the default it is 20 mm/s, at any step",
-    "stiffness": "N/m, floor and body; contacts lie on the stiffer; if equal, half a depth inside, and a gripped ball errs by 13 mm/s",
-    "friction": "the scene's coefficient; 1e6 where the floor grips (1e3 gives the same)",
-}
-"""Effects were measured at 1 ms on boxes and a ball with backspin that lands at 3 m/s, without the one setting."""
 
 
 class Drake(Engine):
@@ -42,6 +33,7 @@ class Drake(Engine):
     reasons = REASONS
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
+    settings: ClassVar = SETTINGS
 
     def discretisation(self, scene: Scenario) -> str | None:
         """Semi-implicit Euler without spin; else ω is as in MuJoCo's Euler, but a step turns by 2 atan(|ω| dt/2), as in Wang's method."""
@@ -55,24 +47,35 @@ class Drake(Engine):
         return unfit or mapping.refusal_of_floor(scene, self.option("floor"))
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return DrakeSimulation(scene, dt, {name: self.option(name) for name in self.choices})
+        return DrakeSimulation(scene, dt, self)
+
+    def chosen(self, scene: Scenario, floor: Floor) -> dict[str, Any]:
+        """The settings for a scene's floor; those left out are Drake's own."""
+        friction = mapping.friction_of(floor, gripping=1e6)
+        chosen: dict[str, Any] = {"friction": friction, "floor_friction": friction}
+        if not self.is_default:
+            chosen |= {name: setting.calibrated for name, setting in SETTINGS.items() if setting.calibrated is not None}
+            chosen["discrete_contact_approximation"] = "sap" if isinstance(floor.friction, str) else "tamsi"
+            chosen["stiffness"] = (1e9 * scene.body.mass, 1e12 * scene.body.mass)
+        return chosen | self.given
 
 
 class DrakeSimulation(Simulation):
     """A plant in a simulator, with a scene graph if the scene has a floor."""
 
-    def __init__(self, scene: Scenario, dt: float, form: Mapping[str, str]) -> None:
+    def __init__(self, scene: Scenario, dt: float, engine: Drake) -> None:
         self.velocity_lag = 0.5 * dt
         builder: Any = DiagramBuilder()
         self._dt, self._steps = dt, 0
         self._plant = builder.AddSystem(MultibodyPlant(dt)) if scene.floor is None else AddMultibodyPlantSceneGraph(builder, dt)[0]
-        scenes = mapping.bodies_in(scene, form["beside"])
+        scenes = mapping.bodies_in(scene, engine.option("beside"))
         bodies = [self._add_body(one, self._plant.AddModelInstance(f"body {number}")) for number, one in enumerate(scenes)]
         self._body = bodies[0]
         self._plant.mutable_gravity_field().set_gravity_vector(scene.acceleration)
-        self.settings = {"version": version("drake"), **form}
+        self.settings = {"version": version("drake"), **{name: engine.option(name) for name in engine.choices}}
         if scene.floor is not None:
-            self.settings |= self._add_floor(scene, scene.floor, form, bodies)
+            self.settings |= engine.chosen(scene, scene.floor)
+            self._add_floor(scene, engine.option("floor"), bodies)
         self._plant.Finalize()
         self._simulator = Simulator(builder.Build())
         self._context = self._plant.GetMyMutableContextFromRoot(self._simulator.get_mutable_context())
@@ -92,25 +95,22 @@ class DrakeSimulation(Simulation):
             self._plant.AddJoint(QuaternionFloatingJoint("free", *frames, *rates))
         return body
 
-    def _add_floor(self, scene: Scenario, floor: Floor, form: Mapping[str, str], bodies: list[Any]) -> dict[str, Any]:
-        plant, body, approximation = self._plant, scene.body, "sap" if isinstance(floor.friction, str) else "tamsi"
-        friction = mapping.friction_of(floor, gripping=1e6)
-        surfaces, found = [ProximityProperties(), ProximityProperties()], dict[str, Any](friction=friction)
-        if form["profile"] == "calibrated":
-            found |= {"sap_near_rigid_threshold": 0.01, "relaxation_time": 1.0, "dissipation": 1e7}
-            found |= {"discrete_contact_approximation": approximation, "stiffness": [1e9 * body.mass, 1e12 * body.mass]}
-            plant.set_discrete_contact_approximation(getattr(DiscreteContactApproximation, f"k{approximation.capitalize()}"))
-            plant.set_sap_near_rigid_threshold(found["sap_near_rigid_threshold"])
-        for number, surface in enumerate(surfaces):
-            spring = (found["dissipation"], found["stiffness"][number]) if "stiffness" in found else (None, None)
-            AddContactMaterial(surface, *spring, CoulombFriction(friction, friction))
-            if "relaxation_time" in found:
-                surface.AddProperty("material", "relaxation_time", found["relaxation_time"])
-        plant.RegisterCollisionGeometry(plant.world_body(), *_floor(form["floor"]), "floor", surfaces[0])
+    def _add_floor(self, scene: Scenario, kind: str, bodies: list[Any]) -> None:
+        plant, body, chosen = self._plant, scene.body, self.settings
+        for name in PLANT.keys() & chosen.keys():
+            value = chosen[name]
+            enumerated = getattr(DiscreteContactApproximation, f"k{value.capitalize()}") if isinstance(value, str) else value
+            getattr(plant, f"set_{name}")(enumerated)
+        surfaces = [ProximityProperties(), ProximityProperties()]
+        for number, (surface, prefix) in enumerate(zip(surfaces, ("floor_", ""), strict=True)):
+            friction, stiffness = chosen[f"{prefix}friction"], chosen["stiffness"][number] if "stiffness" in chosen else None
+            AddContactMaterial(surface, chosen.get("dissipation"), stiffness, CoulombFriction(friction, friction))
+            if "relaxation_time" in chosen:
+                surface.AddProperty("material", "relaxation_time", chosen["relaxation_time"])
+        plant.RegisterCollisionGeometry(plant.world_body(), *_floor(kind), "floor", surfaces[0])
         # One shape would have one point contact with the floor; balls of radius 0 give each corner its own.
         for (number, corner), one in product(enumerate(body.vertices), bodies):
             plant.RegisterCollisionGeometry(one, RigidTransform(corner), Sphere(body.semi_axes[0]), f"corner {number}", surfaces[1])
-        return found
 
     def advance(self, steps: int) -> None:
         self._steps += steps

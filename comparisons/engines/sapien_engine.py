@@ -4,18 +4,18 @@ PhysX applies gravity before it solves contacts, hence v+ = e (u + g dt). A step
 """
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
-from dropspin.comparisons.engines.mapping import SEMI_IMPLICIT_EULER, built, friction_of, may_tumble, principal_frame
+from dropspin.comparisons.engines.mapping import PROFILES, SEMI_IMPLICIT_EULER, built, friction_of, may_tumble, principal_frame
 from dropspin.comparisons.engines.packages import version
+from dropspin.comparisons.engines.sapien_settings import BODY, GRIPPING, OFF_ON, REASONS, SETTINGS, WORLD
 from dropspin.scenarios.bodies import Body, Sphere
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import Array
-from dropspin.scenarios.surfaces import Floor
 
 with warnings.catch_warnings():
     warnings.filterwarnings("ignore", message="Failed to find system libvulkan")  # of the renderer, which is not used
@@ -24,21 +24,7 @@ with warnings.catch_warnings():
 
 TOLERANCE_LENGTH = 1e-3  # m
 ENGINE = physx.PhysxEngine(TOLERANCE_LENGTH, 0.2)  # the one of this process, as long as this holds it
-GRIPPING = 1e6
 UPWARD = np.sqrt([0.5, 0.0, 0.0, 0.5])  # turns the plane's normal from x to y; w first, as in all poses here
-FASTEST = 1e16  # m/s and rad/s
-REASONS = {
-    "tolerance_length": "m; a box's contacts stay while it moves less than 1/20 of it; at SAPIEN's 0.1 a box gains 8% energy at impacts",
-    "enable_tgs": "for a coefficient: a cone; PGS has a pyramid, up to 1.41 times as strong; else PGS: TGS gains 1.3e-3 energy at impacts",
-    "bounce_threshold": "the scene's rest speed, but not 0; by default impacts below 2 m/s do not rebound",
-    "contact_offset": "a step's fall; at the default 1 cm a ball rebounds up to 1 mm above the floor; at 0 a tipping box errs fivefold",
-    "solver_position_iterations": "for PGS; at 4 a gripping corner errs by 1.3e-2 in angular momentum, not 4e-3; for TGS, 100 add rounding",
-    "sleep_threshold": "never falls asleep; by default drop-box-corner, in metres per millisecond, stops in the air after one step",
-    "max_angular_velocity": "rad/s; no clamp, by default at 100",
-    "linear_damping": "(1 - exp(-rate dt))/dt: PhysX multiplies by 1 - c dt, which gives the scene's decay; angular_damping is the same",
-    "friction": f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution: in SAPIEN, PhysX takes the average",
-}
-"""Effects were measured at 1 ms on the core catalogue and on a ball that slides with spin about its path, without the one setting."""
 
 
 class Sapien(Engine):
@@ -46,6 +32,8 @@ class Sapien(Engine):
 
     name, order, precision, reasons = "sapien", 1.0, np.float32, REASONS
     shapes: ClassVar = ("sphere", "box")
+    choices: ClassVar = {"profile": PROFILES}
+    settings: ClassVar = SETTINGS
 
     def discretisation(self, scene: Scenario) -> str | None:
         return SEMI_IMPLICIT_EULER if scene.floor is None and scene.damping is None and not may_tumble(scene) else None
@@ -57,58 +45,76 @@ class Sapien(Engine):
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return SapienSimulation(scene, dt)
+        return SapienSimulation(scene, dt, self)
+
+    def chosen(self, scene: Scenario, dt: float) -> dict[str, Any]:
+        """The settings for a scene at a time step [s]; those left out are SAPIEN's own."""
+        floor, damping, chosen = scene.floor, scene.damping, dict[str, Any]()
+        if not self.is_default:
+            has_coefficient = floor is not None and not isinstance(floor.friction, str)
+            chosen |= {"enable_tgs": OFF_ON[has_coefficient], "bounce_threshold": max(floor.rest_speed if floor else 0.0, 1e-9)}
+            chosen |= {name: setting.calibrated for name, setting in SETTINGS.items() if setting.calibrated is not None}
+            chosen["solver_position_iterations"] = 4 if has_coefficient else 100
+        if damping is not None or not self.is_default:
+            for motion in ("linear", "angular"):
+                chosen[f"{motion}_damping"] = -float(np.expm1(-getattr(damping, motion) * dt)) / dt if damping else 0.0
+        if floor is not None:
+            surface = {"restitution": floor.restitution, "friction": friction_of(floor, GRIPPING)}
+            offset = float(np.linalg.norm(scene.acceleration)) * dt**2 + 1e-6 * scene.body.size
+            chosen |= surface | {f"floor_{name}": value for name, value in surface.items()}
+            chosen |= {} if self.is_default else {"contact_offset": offset}
+        return chosen | self.given
 
 
-def assign(target: Any, values: Mapping[str, Any]) -> None:
-    """Set attributes."""
-    for name, value in values.items():
-        setattr(target, name, value)
+def assign(target: Any, chosen: Mapping[str, Any], names: Iterable[str]) -> None:
+    """Set attributes of the names that are among the settings."""
+    for name in names:
+        if name in chosen:
+            setattr(target, name, chosen[name] == "true" if chosen[name] in OFF_ON else chosen[name])
 
 
 class SapienSimulation(Simulation):
     """A SAPIEN scene with a PhysX system and no renderer."""
 
-    def __init__(self, scene: Scenario, dt: float) -> None:
+    def __init__(self, scene: Scenario, dt: float, engine: Sapien) -> None:
         self.velocity_lag = 0.5 * dt
-        body, floor, damping = scene.body, scene.floor, scene.damping
-        has_coefficient = floor is not None and not isinstance(floor.friction, str)
-        world = {"enable_tgs": has_coefficient, "bounce_threshold": max(floor.rest_speed if floor else 0.0, 1e-9)}
-        dynamics = {"sleep_threshold": 0.0, "max_angular_velocity": FASTEST, "solver_position_iterations": 4 if has_coefficient else 100}
-        for motion in ("linear", "angular"):
-            dynamics[f"{motion}_damping"] = -float(np.expm1(-getattr(damping, motion) * dt)) / dt if damping else 0.0
+        body, chosen = scene.body, engine.chosen(scene, dt)
         before, config = physx.get_scene_config(), physx.PhysxSceneConfig()
-        assign(config, world | {"gravity": scene.acceleration})
+        config.gravity = scene.acceleration
+        assign(config, chosen, WORLD)
         physx.set_scene_config(config)  # of the systems that are created from here on
         self._system, self._entity, self._body = physx.PhysxCpuSystem(), sapien.Entity(), physx.PhysxRigidDynamicComponent()
         physx.set_scene_config(before)
         self._system.timestep = dt
         self._scene = sapien.Scene([self._system])
-        offset = float(np.linalg.norm(scene.acceleration)) * dt**2 + 1e-6 * body.size
-        surface = {} if floor is None else self._add_floor(floor, body, offset)
+        if scene.floor is not None:
+            self._add_floor(body, chosen)
         moments, axes = principal_frame(body.inertia_tensor)
         frame = sapien.Pose(q=np.roll(axes, 1))
-        assign(self._body, dynamics | {"mass": body.mass, "cmass_local_pose": frame, "inertia": moments})
+        assign(self._body, chosen, BODY)
+        self._body.mass, self._body.cmass_local_pose, self._body.inertia = body.mass, frame, moments
         self._entity.add_component(self._body)
         self._entity.pose = sapien.Pose(scene.start.position, np.roll(scene.start.orientation, 1))
         self._scene.add_entity(self._entity)
-        assign(self._body, {"linear_velocity": scene.start.velocity, "angular_velocity": scene.start.angular_velocity})
-        versions = {"version": version("sapien"), "physx": physx.version()}
-        self.settings = versions | {"timestep": dt, "tolerance_length": TOLERANCE_LENGTH} | world | dynamics | surface
+        self._body.linear_velocity, self._body.angular_velocity = scene.start.velocity, scene.start.angular_velocity
+        versions = {"version": version("sapien"), "physx": physx.version(), "profile": engine.option("profile")}
+        self.settings = versions | {"timestep": dt, "tolerance_length": TOLERANCE_LENGTH} | chosen
 
-    def _add_floor(self, floor: Floor, body: Body, offset: float) -> dict[str, float]:
-        friction = friction_of(floor, GRIPPING)
-        material = physx.PhysxMaterial(friction, friction, floor.restitution)
+    def _add_floor(self, body: Body, chosen: Mapping[str, Any]) -> None:
+        materials = []
+        for prefix in ("", "floor_"):
+            friction = chosen[f"{prefix}friction"]
+            materials.append(physx.PhysxMaterial(friction, friction, chosen[f"{prefix}restitution"]))
         ball, box = physx.PhysxCollisionShapeSphere, physx.PhysxCollisionShapeBox
-        shape = ball(body.radius, material) if isinstance(body, Sphere) else box(body.vertices.max(0), material)
-        plane, ground, fixed = physx.PhysxCollisionShapePlane(material), sapien.Entity(), physx.PhysxRigidStaticComponent()
+        shape = ball(body.radius, materials[0]) if isinstance(body, Sphere) else box(body.vertices.max(0), materials[0])
+        plane, ground, fixed = physx.PhysxCollisionShapePlane(materials[1]), sapien.Entity(), physx.PhysxRigidStaticComponent()
         plane.local_pose = sapien.Pose(q=UPWARD)
-        plane.contact_offset = shape.contact_offset = offset
+        for surface in (plane, shape):
+            assign(surface, chosen, ["contact_offset"])
         self._body.attach(shape)
         fixed.attach(plane)
         ground.add_component(fixed)
         self._scene.add_entity(ground)
-        return {"restitution": floor.restitution, "friction": friction, "contact_offset": offset}
 
     def advance(self, steps: int) -> None:
         for _ in range(steps):

@@ -133,6 +133,14 @@ def summary(release: Release, label: str, dt: float) -> list[str]:
     return [f"{words}: {', '.join(groups[words])}" for words in dict.fromkeys([*GROUPS, *groups]) if words in groups]
 
 
+def changes_in_words(changed: Sequence[Change]) -> str:
+    """The releases in which results changed, and the others in which scenes gained or lost their results."""
+    numbers = list(dict.fromkeys(change.release for change in changed if change.metric))
+    others = [release for release in dict.fromkeys(change.release for change in changed) if release not in numbers]
+    parts = [f"results changed in {', '.join(numbers)}" if numbers else "no result changed"]
+    return "; ".join(parts + ([f"scenes gained or lost results in {', '.join(others)}"] if others else []))
+
+
 def badge(engine: str, release: Release, label: str, dt: float) -> dict[str, Any]:
     """The badge of an engine, as shields.io reads it: https://shields.io/badges/endpoint-badge."""
     errors = [relative_error(case, scene) for scene, case in release.at(label, dt).items()]

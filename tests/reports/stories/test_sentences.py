@@ -13,7 +13,7 @@ from dropspin.comparisons.regressions.attribution import Attribution
 from dropspin.comparisons.regressions.changes import EqualMotions, SpeedChange
 from dropspin.comparisons.regressions.comparing import Changes, History
 from dropspin.comparisons.symmetries.findings import Finding
-from dropspin.reports.stories import compare, conform, history, numbers, reproduce, rerun, scene, symmetries
+from dropspin.reports.stories import compare, conform, history, numbers, record, reproduce, rerun, scene, symmetries
 from dropspin.scenarios import load
 
 PASSED, DECLINED = CheckResult("a", "passed", "yes"), CheckResult("b", "declined", "no floor")
@@ -83,6 +83,10 @@ def modelled(**tables):
             comparison(motions=[EqualMotions("a", 1, 2, "s", 1e-3, 1200), EqualMotions("b", 2, 2)]),
             "Motions equal bit for bit: a 1 of 2, the first difference in s at 1 ms in step 1,200; b 2 of 2. None of 0 results is worse.",
         ),
+        (record.changes_in_words([]), "no result changed"),
+        (record.changes_in_words([changed("2.0", "energy_error")]), "results changed in 2.0"),
+        (record.changes_in_words([changed("2.0"), changed("3.0")]), "no result changed; scenes gained or lost results in 2.0, 3.0"),
+        (record.changes_in_words([changed("2.0"), changed("2.0", "m")]), "results changed in 2.0"),
         (
             again((MEASURED, LATER), (MEASURED, MEASURED), numpy=("1", "2")),
             "1 of 2 results differs from the record. Different from the record: numpy 2 (in the record: 1).",

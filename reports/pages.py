@@ -37,7 +37,7 @@ def _environment() -> Environment:
 
 def _unbroken(text: str) -> str:
     """A sentence that is not broken between a number and its unit."""
-    return re.sub(r"(?<=\d) (?=(?:%|[mµn]?s|m|rad)(?!\w))", "\xa0", text)
+    return re.sub(r"(?<=\d) (?=(?:%|[mµn]?s|[kmµ]?m|m?rad)(?!\w))", "\xa0", text)
 
 
 def _base64_sha256(text: str) -> str:

@@ -86,7 +86,7 @@ class Site:
         return sum(any(case.verdict == "measured" for case in one.cases.values()) for one in self.measured[engine])
 
     def remarks(self, scene: str) -> list[str]:
-        """The known limitations in a scene, and why engines have no result, at the finest time step."""
+        """The limitations of engines in a scene, and why engines have no result, at the finest time step."""
         return view.remarks({label: self.case(label, scene, self.dts[-1]) for label in self.engines})
 
     def link(self, label: str) -> str:

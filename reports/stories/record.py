@@ -41,7 +41,7 @@ def cell(release: Release, label: str, scene: str, dt: float) -> Cell:
     parts += [f"over starts {sizes(case)}"] if sizes(case) else []
     parts += [f"{cost(case)} per simulated second, {case.relative_cost:.3g} times that of Wang's method"] if cost(case) != "–" else []
     shown = ", ".join(parts) + ", "
-    status, mark = ("known limitation", "! ") if case.reason else ("measured", "")
+    status, mark = ("limited", "! ") if case.reason else ("measured", "")
     return Cell(f"{mark}{math.floor(10.0 * digits(error)) / 10.0:.1f}", level(error), status, remark + shown + again)
 
 
@@ -75,7 +75,7 @@ def mean_cost(release: Release, label: str, dt: float, *, with_floor: bool) -> s
 def remarks(cases: Mapping[str, Case]) -> list[str]:
     """Why there is no result, or which limitation is known: a sentence for all names, of scenes or labels, that have the same."""
     alike = grouped([name for name, case in cases.items() if case.reason], lambda name: (cases[name].verdict, cases[name].reason))
-    words = {verdict: "known limitation" if verdict == "measured" else word(verdict) for verdict, _ in alike}
+    words = {verdict: "limited" if verdict == "measured" else word(verdict) for verdict, _ in alike}
     return [f"{', '.join(names)}: {words[verdict]}: {reason}" for (verdict, reason), names in alike.items()]
 
 
@@ -113,11 +113,10 @@ def _words(change: Change) -> str:
     if not change.metric:
         reason = change.now.reason if change.now.verdict != "measured" else f"before: {change.was.reason}"
         return f"{word(change.was.verdict)} → {word(change.now.verdict)} ({reason})"
-    old, new = formatted(change.old), formatted(change.new)
-    if old == new:  # as many digits as are needed to see the difference
-        old, new = next(pair for n in range(4, 18) if len(set(pair := (f"{change.old:.{n}g}", f"{change.new:.{n}g}"))) == 2)
+    old, new, unit = formatted(change.old), formatted(change.new), METRICS[change.metric].unit
+    moved = f"→ {with_unit(new, unit)}" if old != new else f"changed by {with_unit(formatted(change.new - change.old), unit)}"
     step = f"dt = {in_ms(change.dt)}".replace(" ", "\xa0")  # in one line
-    return f"{change.metric.replace('_', ' ')} {old} → {with_unit(new, METRICS[change.metric].unit)} at {step}"
+    return f"{change.metric.replace('_', ' ')} {old} {moved} at {step}"
 
 
 def summary(release: Release, label: str, dt: float) -> list[str]:

@@ -172,7 +172,7 @@
       let [[x0, x1], [y0, y1]] = this.ranges();
       this.yTicks = raw.rows ? raw.rows.map((row, i) => [i, row]) : (this.yLog ? logTicks : linearTicks)([y0, y1], 6);
       const longest = Math.max(0, ...this.yTicks.map(([, text]) => text.length));
-      const left = raw.rows ? 0.36 * width : raw.map ? RIGHT : Math.max(LEFT, CHARACTER * longest + BESIDE), height = raw.rows ? 60 + Math.max(26, ...raw.rows.map((row) => 12 * linesOf(row).length)) * raw.rows.length : HEIGHT;
+      const left = raw.rows ? Math.min(0.36 * width, CHARACTER * Math.max(...raw.rows.flatMap(linesOf).map((text) => text.length)) + 1.5 * BESIDE) : raw.map ? RIGHT : Math.max(LEFT, CHARACTER * longest + BESIDE), height = raw.rows ? 60 + Math.max(26, ...raw.rows.map((row) => 12 * linesOf(row).length)) * raw.rows.length : HEIGHT;
       const [wide, tall] = [width - left - RIGHT, height - TOP - (raw.map ? TOP : BOTTOM)];
       if (raw.map) {   // the same scale along both axes
         const scale = Math.max((x1 - x0) / wide, (y1 - y0) / tall), [mx, my] = [(x0 + x1) / 2, (y0 + y1) / 2];

@@ -41,6 +41,10 @@ def changed(release, metric=""):
     return Change("1.0", release, "a", "drop-ball", 1e-3, MEASURED, LATER, metric, 1.0, 2.0)
 
 
+def moved(new):
+    return record.change_sentences([Change("1.0", "2.0", "a", "drop-ball", 1e-3, MEASURED, LATER, "energy_error", 0.1, new)])["2.0"][0]
+
+
 def again(*cases, **differing):
     return " ".join(rerun._sentences(Again(dict(enumerate(cases)), differing)))
 
@@ -87,6 +91,8 @@ def modelled(**tables):
         (record.changes_in_words([changed("2.0", "energy_error")]), "results changed in 2.0"),
         (record.changes_in_words([changed("2.0"), changed("3.0")]), "no result changed; scenes gained or lost results in 2.0, 3.0"),
         (record.changes_in_words([changed("2.0"), changed("2.0", "m")]), "results changed in 2.0"),
+        (moved(0.2), "drop-ball with a: energy error 0.100 → 0.200 at dt\xa0=\xa01\xa0ms"),
+        (moved(0.1 + 1e-7), "drop-ball with a: energy error 0.100 changed by 1.00e-07 at dt\xa0=\xa01\xa0ms"),
         (
             again((MEASURED, LATER), (MEASURED, MEASURED), numpy=("1", "2")),
             "1 of 2 results differs from the record. Different from the record: numpy 2 (in the record: 1).",

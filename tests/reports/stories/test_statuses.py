@@ -66,6 +66,16 @@ def test_explanation_has_the_error_its_bound_and_the_reason(core, scene, engine,
     assert re.fullmatch(pattern, found), found
 
 
+def test_undecided_trends_of_the_conclusion_are_the_marks_of_the_matrix(core):
+    marked = {(scene, engine) for scene, of in core.statuses().items() for engine, status in of.items() if status.mark == "~"}
+    [sentence] = [sentence for sentence in overview(core).conclusion if sentence.startswith("Passed, but undecided")]
+    clauses = dict(clause.split(" in ") for clause in sentence.partition("(~): ")[2].removesuffix(".").split("; "))
+    for engine in core.engines:
+        scenes = [scene for scene, of in marked if of == engine]
+        assert bool(scenes) == (engine in clauses)
+        assert all(scene in clauses[engine] for scene in scenes) or clauses[engine] == f"{len(scenes)} scenes"
+
+
 def test_failure_is_the_status_of_its_scene():
     results = ds.run("spin-principal", made.engine_with("drifting", made.turned_by(0.1)))
     assert overview(results).statuses["spin-principal"]["drifting"] == ("failed", "")

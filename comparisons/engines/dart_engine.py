@@ -45,7 +45,7 @@ class Dart(Engine):
     def chosen(self, floor: Floor) -> dict[str, Any]:
         """The settings for a floor."""
         restitution, friction = floor.restitution, mapping.friction_of(floor, gripping=1e6)
-        world = {name: setting.default for name, setting in SETTINGS.items() if setting.values}
+        world: dict[str, Any] = {name: setting.default for name, setting in SETTINGS.items() if setting.values}
         if not self.is_default:
             restitution = min(1.0, restitution + (1.0 + restitution) * 1e-5)
             world |= {name: SETTINGS[name].calibrated for name in world if not SETTINGS[name].is_computed}

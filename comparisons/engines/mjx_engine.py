@@ -17,7 +17,7 @@ from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, K
 from dropspin.comparisons.engines.mapping import built
 from dropspin.comparisons.engines.mujoco_engine import MuJoCo, flight_of
 from dropspin.comparisons.engines.mujoco_limitations import limitations_met
-from dropspin.comparisons.engines.mujoco_ports import Port, ported_model
+from dropspin.comparisons.engines.mujoco_ports import SETTINGS, Port, ported_model
 from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
 from dropspin.comparisons.engines.packages import numbers_of, version
 from dropspin.scenarios import Scenario
@@ -44,8 +44,8 @@ class MJX(Port):
     def discretisation(self, scene: Scenario) -> str | None:
         """MuJoCo's, but the gyroscopic term is explicit in `implicitfast` too, and RK4's rotations are those of MuJoCo before 4.0."""
         if self.option("integrator") == "rk4":
-            return flight_of("rk4", numbers_of(version("mujoco-mjx")))
-        return MuJoCo().discretisation(scene)
+            return flight_of("rk4", numbers_of(version("mujoco-mjx"))) if self.is_calibrated else None
+        return MuJoCo({name: text for name, text in self.options.items() if name in SETTINGS}).discretisation(scene)
 
     def declines(self, scene: Scenario) -> str | None:
         recomputed = self.option("integrator") == "implicitfast" or scene.damping is not None
@@ -57,21 +57,21 @@ class MJX(Port):
         return super().declines(scene)
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return MJXSimulation(scene, dt, self.option("integrator"), self.precision)
+        return MJXSimulation(scene, dt, self)
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
         models = members[:1] if differ_in_start_alone(members) else members
-        return MJXBatch([MJXSimulation(member, dt, self.option("integrator"), self.precision) for member in models], members)
+        return MJXBatch([MJXSimulation(member, dt, self) for member in models], members)
 
 
 class MJXSimulation(Simulation):
     """A model and its data on JAX's default device."""
 
-    def __init__(self, scene: Scenario, dt: float, integrator: str, precision: type) -> None:
-        jax.config.update("jax_enable_x64", precision is np.float64)  # for the whole process; each engine has one of its own
-        self.velocity_lag = 0.0 if integrator == "rk4" else 0.5 * dt
-        self._scene, self._dt = scene, dt
-        model, settings = ported_model(scene, dt, integrator, precision)
+    def __init__(self, scene: Scenario, dt: float, engine: MJX) -> None:
+        jax.config.update("jax_enable_x64", engine.precision is np.float64)  # for the whole process; each engine has one of its own
+        self.velocity_lag = 0.0 if engine.option("integrator") == "rk4" else 0.5 * dt
+        self._scene, self._dt, self._is_calibrated = scene, dt, engine.is_calibrated
+        model, settings = ported_model(scene, dt, engine)
         self.model = mjx.put_model(model)
         # The radii are a constant of the compiled functions, which use them for height fields alone.
         radii = "_impl.geom_rbound_hfield" if hasattr(self.model, "_impl") else "geom_rbound_hfield"  # up to MJX 3.3.2
@@ -101,7 +101,7 @@ class MJXSimulation(Simulation):
 
     def limitations_of(self, scene: Scenario, states: Array) -> list[KnownLimitation]:
         """The limitations that a motion met, given its states after each step, shape (n, 13)."""
-        return list(limitations_met(scene, states, self._dt, estimated=True))
+        return list(limitations_met(scene, states, self._dt, estimated=True)) if self._is_calibrated else []
 
     def as_built(self) -> AsBuilt:
         model = self.model

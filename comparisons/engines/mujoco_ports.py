@@ -10,6 +10,8 @@ from dropspin.comparisons.engines.mapping import refusal_of_damped_axes
 from dropspin.comparisons.engines.mujoco_engine import REASONS as MUJOCO_REASONS
 from dropspin.comparisons.engines.mujoco_engine import MuJoCo
 from dropspin.comparisons.engines.mujoco_model import FORM, calibrated_specification, contact
+from dropspin.comparisons.engines.mujoco_settings import SETTINGS as MUJOCO_SETTINGS
+from dropspin.comparisons.engines.mujoco_settings import set_in
 from dropspin.comparisons.engines.mujoco_simulation import set_damping
 from dropspin.scenarios import Scenario
 
@@ -23,11 +25,16 @@ REASONS = {name: MUJOCO_REASONS[name] for name in ("solref", "solimp", "solreffr
     "rebound would err by up to 2e-3",
 }
 
+OF_CONTACTS = ("friction", "solref", "solimp", "solreffriction", "cone", "impratio")
+OF_SOLVER = ("iterations", "tolerance", "ls_iterations", "ls_tolerance")
+SETTINGS = {name: MUJOCO_SETTINGS[name]._replace(needs=()) for name in (*OF_CONTACTS, *OF_SOLVER, "density", "viscosity", "armature")}
+"""MuJoCo's settings that its ports have."""
+
 
 class Port(Engine):
     """A port of MuJoCo with the option `integrator`: it claims and declines what MuJoCo does, unless it says otherwise."""
 
-    compiles, reasons = True, REASONS
+    compiles, reasons, settings = True, REASONS, SETTINGS
 
     @property
     def order(self) -> float:  # type: ignore[override]  # the claim depends on the option
@@ -36,7 +43,7 @@ class Port(Engine):
 
     @property
     def _mujoco(self) -> MuJoCo:
-        return MuJoCo({"integrator": self.option("integrator")})
+        return MuJoCo({name: text for name, text in self.options.items() if name == "integrator" or name in SETTINGS})
 
     def discretisation(self, scene: Scenario) -> str | None:
         """MuJoCo's."""
@@ -46,8 +53,9 @@ class Port(Engine):
         return refusal_of_damped_axes(scene) or self._mujoco.declines(scene)
 
 
-def ported_model(scene: Scenario, dt: float, integrator: str, precision: type) -> tuple[Any, dict[str, Any]]:
+def ported_model(scene: Scenario, dt: float, engine: Port) -> tuple[Any, dict[str, Any]]:
     """A compiled model without the flags that ports lack (autoreset, diagexact), and its settings."""
+    integrator, precision, given = engine.option("integrator"), engine.precision, engine.given
     floor = scene.floor
     pair = {} if floor is None else contact(floor, dt)
     if floor is not None and floor.friction == "infinite" and precision is np.float32:
@@ -63,4 +71,5 @@ def ported_model(scene: Scenario, dt: float, integrator: str, precision: type) -
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
     model = spec.compile()
     set_damping(model, scene)
-    return model, settings | pair
+    set_in(model, given)
+    return model, settings | pair | given

@@ -31,25 +31,26 @@ class MuJoCoWarp(Port):
     choices: ClassVar = {"integrator": ("euler", "implicit", "implicitfast", "rk4")}
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return OneWorld(scene, Worlds([scene], dt, self.option("integrator")))
+        return OneWorld(scene, Worlds([scene], dt, self))
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
         if len({member.body.vertices.tobytes() for member in members if isinstance(member.body, Vertices)}) > 1:
             return None  # a model has one mesh
-        return Worlds(members, dt, self.option("integrator"))
+        return Worlds(members, dt, self)
 
 
 class Worlds(BatchSimulation):
     """Worlds on Warp's default device, with their step as a graph."""
 
-    def __init__(self, members: Sequence[Scenario], dt: float, integrator: str) -> None:
-        self.dt, self.velocity_lag = dt, 0.0 if integrator == "rk4" else 0.5 * dt
-        model, settings = ported_model(members[0], dt, integrator, np.float32)
+    def __init__(self, members: Sequence[Scenario], dt: float, engine: MuJoCoWarp) -> None:
+        self.dt, self.velocity_lag = dt, 0.0 if engine.option("integrator") == "rk4" else 0.5 * dt
+        self._is_calibrated = engine.is_calibrated
+        model, settings = ported_model(members[0], dt, engine)
         device = wp.get_device()
         self.settings = {"version": version("mujoco-warp"), "warp": wp.config.version, "device": f"{device} ({device.name})"} | settings
         self.model, self._data = mjw.put_model(model), mjw.make_data(model, nworld=len(members))
         if not differ_in_start_alone(members):
-            self._give_each_its_own([ported_model(member, dt, integrator, np.float32)[0] for member in members])
+            self._give_each_its_own([ported_model(member, dt, engine)[0] for member in members])
         rows = from_world(initial_states(members)).astype(np.float32)
         mjw.step(self.model, self._data)  # compiles; nothing may be loaded while a graph is captured
         with wp.ScopedCapture() as capture:
@@ -88,7 +89,7 @@ class Worlds(BatchSimulation):
         return to_world(np.concatenate(rows)).reshape(len(rows), -1, 13).swapaxes(0, 1)
 
     def limitations_of(self, scene: Scenario, states: Array) -> list[KnownLimitation]:
-        return list(limitations_met(scene, states, self.dt, estimated=True))
+        return list(limitations_met(scene, states, self.dt, estimated=True)) if self._is_calibrated else []
 
     def as_built(self) -> AsBuilt:
         """The first world."""

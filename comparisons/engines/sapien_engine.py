@@ -36,7 +36,8 @@ class Sapien(Engine):
     settings: ClassVar = SETTINGS
 
     def discretisation(self, scene: Scenario) -> str | None:
-        return SEMI_IMPLICIT_EULER if scene.floor is None and scene.damping is None and not may_tumble(scene) else None
+        falls = scene.floor is None and scene.damping is None and not may_tumble(scene)
+        return SEMI_IMPLICIT_EULER if falls and self.is_calibrated else None
 
     def declines(self, scene: Scenario) -> str | None:
         floor = scene.floor

@@ -166,6 +166,14 @@ def test_default_profile_of_other_engines_is_not_the_calibrated_one(name):
     assert 1e-6 < np.abs(moved).max() < 0.1
 
 
+@pytest.mark.parametrize("name", ["dart", "drake"])
+def test_friction_that_is_given_stops_a_box(name):
+    """DART takes the smaller coefficient of 0.3 and 0.1; Drake 2 · 0.3 · 0.1 / (0.3 + 0.1)."""
+    sliding = load("slide-box").model_copy(update={"duration": 0.2})
+    speeds = np.linalg.norm(simulate(sliding, f"{name}[floor_friction=0.1]", 1e-3).velocity[[0, -1]], axis=1)
+    assert (speeds[0] - speeds[1]) / (9.8 * 0.2) == pytest.approx({"dart": 0.1, "drake": 0.15}[name], rel=1e-3)
+
+
 def test_rapiers_default_has_four_substeps_and_averages_restitutions():
     """Velocity lags by half a substep; a ball of restitution 0.6 on a floor of 0.2 rebounds with 0.4, to single precision and a step."""
     smooth = {"restitution": 0.6, "friction": "none"}

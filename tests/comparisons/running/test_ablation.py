@@ -68,6 +68,7 @@ def test_default_profiles_are_explained():
         *(("mujoco", "drop-ball", 2e-3), ("mujoco", "drop-box-edge", 2e-3), ("mujoco", "spin-damped", 2e-3), ("mujoco", "slide-box", 4e-3)),
         *(("pybullet", "drop-ball", 2e-3), ("pybullet", "drop-box-edge", 2e-3), ("pybullet", "spin-damped", 2e-3)),
         *(("pybullet", "slide-box", 4e-3), ("rapier", "drop-ball", 2e-3), ("rapier", "spin-damped", 2e-3), ("rapier", "slide-box", 4e-3)),
+        *((name, "turn-box-rough", 4e-3) for name in ("dart", "drake")),
     ],
 )
 def test_default_profile_is_the_calibrated_one_with_its_settings_written_out(name, scene_name, dt):

@@ -5,27 +5,66 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dropspin.comparisons.engines import mapping
-from dropspin.comparisons.engines.node_engine import NodeEngine
+from dropspin.comparisons.engines.node_engine import OFF_ON, NodeEngine
+from dropspin.comparisons.engines.options import Setting
 from dropspin.comparisons.engines.packages import JOLT
 from dropspin.scenarios import Scenario
 
 GRIPPING, SLOWEST = 1e6, 0.01
 SYSTEM = {
-    "mPenetrationSlop": (0.0, "m; else a body stays as deep as it lands, up to 2 cm"),
-    "mUseBodyPairContactCache": (False, "normals that are kept turn with the body; a stick that slips errs by 1.1 cm, not 0.9 mm"),
+    "mPenetrationSlop": Setting(0.02, "depth that is not corrected", 0.0, "m; else a body stays as deep as it lands, up to 2 cm", "m"),
+    "mUseBodyPairContactCache": Setting(
+        "true",
+        "contacts are kept while a body hardly moves",
+        "false",
+        "normals that are kept turn with the body; a stick that slips errs by 1.1 cm, not 0.9 mm",
+        values=OFF_ON,
+    ),
+    "mMinVelocityForRestitution": Setting(
+        1.0,
+        "impact speed below which a body does not rebound",
+        why="m/s, the scene's rest speed; 1 by default",
+        unit="m/s",
+        is_computed=True,
+    ),
+    "mSpeculativeContactDistance": Setting(
+        0.02,
+        "distance at which a contact begins",
+        why="m, a step's fall; at 2 cm bodies rebound above the floor, a box that falls 1 m by up to 4 mm at 1 ms",
+        unit="m",
+        is_computed=True,
+    ),
+    "mBaumgarte": Setting(0.2, "share of the depth that a step corrects", most=1.0),
+    "mNumVelocitySteps": Setting(10, "iterations for velocities", least=2),
+    "mNumPositionSteps": Setting(2, "iterations for positions"),
 }
+"""Of the physics system."""
 BODY = {
-    "mAllowSleeping": (False, "by default bodies slower than 0.03 m/s sleep after 0.5 s"),
-    "mApplyGyroscopicForce": (True, "off by default; a tumbling body then keeps its angular velocity"),
-    "mMaxLinearVelocity": (1e15, "m/s, 500 by default"),
-    "mMaxAngularVelocity": (1e15, "rad/s, 47 by default"),
+    "mAllowSleeping": Setting(
+        "true", "the body may fall asleep", "false", "by default bodies slower than 0.03 m/s sleep after 0.5 s", values=OFF_ON
+    ),
+    "mApplyGyroscopicForce": Setting(
+        "false", "the gyroscopic term", "true", "off by default; a tumbling body then keeps its angular velocity", values=OFF_ON
+    ),
+    "mMaxLinearVelocity": Setting(500.0, "largest speed", 1e15, "m/s, 500 by default", "m/s"),
+    "mMaxAngularVelocity": Setting(47.12389, "largest spin", 1e15, "rad/s, 47 by default", "rad/s"),
+    "mLinearDamping": Setting(
+        0.05,
+        "damping",
+        why="(1 - exp(-rate dt))/dt, for Jolt multiplies by 1 - c dt; 0.05 by default; mAngularDamping is the same",
+        unit="1/s",
+        is_computed=True,
+    ),
+    "mAngularDamping": Setting(0.05, "damping of rotation", unit="1/s", is_computed=True),
 }
-REASONS = {name: why for name, (_, why) in (SYSTEM | BODY).items()} | {
-    "mMinVelocityForRestitution": "m/s, the scene's rest speed; 1 by default",
-    "mSpeculativeContactDistance": "m, a step's fall; at 2 cm bodies rebound above the floor, a box that falls 1 m by up to 4 mm at 1 ms",
-    "mLinearDamping": "(1 - exp(-rate dt))/dt, for Jolt multiplies by 1 - c dt; 0.05 by default; mAngularDamping is the same",
-    "mFriction": f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution",
+"""Of the body."""
+SURFACE = {
+    "mRestitution": Setting(0.0, "of body and floor", is_computed=True, most=1.0),
+    "mFriction": Setting(
+        0.2, "of body and floor", why=f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution", is_computed=True
+    ),
 }
+REASONS = {name: setting.why for name, setting in (SYSTEM | BODY | SURFACE).items() if setting.why}
 """Effects were measured at 1 ms without the one setting."""
 
 
@@ -35,6 +74,8 @@ class Jolt(NodeEngine):
     name, package, order, precision, reasons = "jolt", JOLT, 1.0, np.float32, REASONS
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
+    groups: ClassVar = {"system": SYSTEM, "body": BODY, "surface": SURFACE}
+    settings: ClassVar = SYSTEM | BODY | SURFACE
 
     def declines(self, scene: Scenario) -> str | None:
         if 0.0 < np.linalg.norm(scene.start.angular_velocity) < SLOWEST:
@@ -49,5 +90,5 @@ class Jolt(NodeEngine):
             return {"system": {}, "body": damping if scene.damping else {}, "surface": surface}
         fall = float(np.linalg.norm(scene.acceleration)) * dt**2
         system = {"mMinVelocityForRestitution": floor.rest_speed if floor else 0.0, "mSpeculativeContactDistance": fall}
-        calibrated, body = ({name: value for name, (value, _) in chosen.items()} for chosen in (SYSTEM, BODY))
+        calibrated, body = ({name: one.calibrated for name, one in group.items() if one.calibrated is not None} for group in (SYSTEM, BODY))
         return {"system": calibrated | system, "body": body | damping, "surface": surface}

@@ -5,6 +5,7 @@ An adapter is a subclass of `NodeEngine` and a driver, a file of the same name t
 
 import inspect
 from abc import abstractmethod
+from collections.abc import Mapping
 from itertools import count
 from pathlib import Path
 from typing import Any, ClassVar
@@ -12,10 +13,12 @@ from typing import Any, ClassVar
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation
 from dropspin.comparisons.engines.node_process import node
+from dropspin.comparisons.engines.options import Setting
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.state import PARTS
 
+OFF_ON = ("false", "true")
 NUMBERS = count()
 """Of the worlds in Node.js."""
 
@@ -27,10 +30,20 @@ class NodeEngine(Engine):
     shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"profile": mapping.PROFILES, "beside": mapping.BESIDE}
     representations: ClassVar[tuple[str, ...]] = ("beside",)
+    groups: ClassVar[Mapping[str, Mapping[str, Setting]]] = {}
+    """The settings that can be given, by the part of `world_settings` that has them."""
 
     @abstractmethod
     def world_settings(self, scene: Scenario, dt: float) -> dict[str, Any]:
-        """The engine's settings for a scene at a time step [s], as the driver takes them."""
+        """The engine's settings for a scene at a time step [s], as the driver takes them, but for those that are given."""
+
+    def chosen(self, scene: Scenario, dt: float) -> dict[str, Any]:
+        """The settings with those that are given; switches are true or false."""
+        chosen = self.world_settings(scene, dt)
+        for group, settings in self.groups.items():
+            values = chosen[group] | {name: value for name, value in self.given.items() if name in settings}
+            chosen[group] = {name: value == "true" if value in OFF_ON else value for name, value in values.items()}
+        return chosen
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return NodeSimulation(self, scene, dt)
@@ -46,10 +59,11 @@ class NodeSimulation(Simulation):
         floor = {"kind": options.get("floor", "plane"), "halfSize": mapping.FLOOR_HALF_SIZE} if scene.floor else None
         bodies = [_body(one) for one in mapping.bodies_in(scene, options["beside"])]
         given = {"dt": dt, "gravity": scene.acceleration.tolist(), "floor": floor, "bodies": bodies}
-        answer, _ = self._node.ask("open", world=self._world, settings=engine.world_settings(scene, dt), **given)
+        answer, _ = self._node.ask("open", world=self._world, settings=engine.chosen(scene, dt), **given)
         self._built, self.velocity_lag = answer.get("built"), 0.5 * dt / answer["substeps"]
         self._state = self._ask(0)[0]
-        self.settings = {"version": self._node.version, **options, **answer["settings"]}
+        shown = {name: OFF_ON[value] if isinstance(value, bool) else value for name, value in answer["settings"].items()}
+        self.settings = {"version": self._node.version, **options, **shown}
 
     def _ask(self, steps: int, every: int = 1) -> Array:
         """States now and after each `every` of some steps."""

@@ -58,7 +58,7 @@ def _sentence(row: Mapping[Hashable, Any]) -> str:
     if cause == COMBINED:
         return f"At least {formatted(row['lower_of_limit'])} is due to the model, the settings and the start together."
     if cause not in ("model", "setting"):
-        return f"Set by {cause}, which is the engine's own: it {row['reason_of_limit']}."
+        return f"Due to {cause}, an option of the engine: the error {row['reason_of_limit']}."
     a_setting, a_model = "setting error: the calibrated profile has none or a smaller one", "model error, which no time step removes"
     kind = a_setting if cause == "setting" else a_model
     rest = value - limit

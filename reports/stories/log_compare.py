@@ -1,4 +1,4 @@
-"""The output of `dropspin log compare`: errors of engines beside measured tosses, groups that the tosses do not tell apart, and parts."""
+"""The output of `dropspin log compare`: errors of engines beside measured tosses, groups without significant differences, and parts."""
 
 import math
 from collections.abc import Sequence
@@ -23,9 +23,9 @@ LEGEND = (
     "in percent of {length:.4g} mm, the largest extent of the body, and energies in percent of that at the start."
 )
 IMPROVED = (
-    "Parts are what an error loses when one thing after another is improved: the centre of mass by the flights, fitted friction and "
-    "restitution, half of the time step; then the noise floor. The rest is due to the model of contact. A "
-    "negative part is an increase."
+    "Each part is the decrease of the error after one more improvement: the centre of mass that the flights show, fitted friction and "
+    "restitution, half of the time step. Then follow the noise floor and the rest, which is due to the model of contact. A negative part "
+    "is an increase."
 )
 AT = {"impact": "at impact", "+0.1 s": "0.1 s later", "mean": "mean over the motion", "end": "at the end"}
 
@@ -123,13 +123,13 @@ def _pair_row(pair: Pair) -> dict[str, str]:
 def _group_sentences(study: LogComparison) -> list[str]:
     """The groups by quantity, and what they mean."""
     sentences = [
-        f"By {quantity}, these tosses do not tell apart: {'; '.join(' and '.join(group) for group in groups if len(group) > 1)}."
+        f"In {quantity}, these engines do not differ significantly: {'; '.join(' and '.join(group) for group in groups if len(group) > 1)}."
         for quantity, groups in study.groups.items()
         if any(len(group) > 1 for group in groups)
     ]
     meaning = (
-        "The intervals of the differences hold for all pairs at once. Within a group there is no order; an engine may be in two groups, "
-        "whose other members differ."
+        "The intervals of the differences hold for all pairs together. A group of engines has no order; an engine is in two groups if it "
+        "differs from members of neither."
     )
     return [*sentences, meaning] if study.pairs else []
 

@@ -237,7 +237,7 @@ class Scenario(Table):
 
     @property
     def factor_dt(self) -> float:
-        """Time step that factors of damping are meant at, which other steps may apply too [s]; 0 for rates, and without damping."""
+        """Time step [s] for which the factors of damping are given; 0 if rates are given, and without damping."""
         return 0.0 if self.damping is None else self.damping.factor_dt or 0.0
 
     @property
@@ -260,7 +260,7 @@ class Scenario(Table):
 
     @property
     def structure(self) -> tuple[str | int | bool, ...]:
-        """What is not a number of the scene: the kind of body, how many vertices, which tables there are, and the kind of friction."""
+        """All that is not a number: the kind of body, the number of vertices, the tables of the scene, and the kind of friction."""
         frictions = [surface.friction if isinstance(surface.friction, str) else "coefficient" for surface in self.surfaces]
         ends = self.floor is not None and self.floor.ends
         return self.body.shape, len(self.body.vertices), self.gravity is None, self.damping is None, ends, *frictions

@@ -87,7 +87,7 @@ class BodyDiagnosis:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found of a model.
+    """The findings on a model.
 
     Attributes:
         file: The file as the user gave it.

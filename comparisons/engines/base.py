@@ -60,7 +60,7 @@ class KnownLimitation(NamedTuple):
 
     @property
     def is_minor(self) -> bool:
-        """Whether it explains errors below 1 % alone; it is then mentioned where it explains one, and not by itself."""
+        """Whether it explains only errors below 1 %; it is then reported only where it explains an error."""
         return bool(self.explained_errors) and max(self.explained_errors.values()) < MINOR
 
 
@@ -119,7 +119,7 @@ class Engine(Configured, ABC):
     def discretisation(self, scene: Scenario) -> str | None:
         """The name of the discretisation of a scene's motion; None if it is not known.
 
-        Two engines of the same one make the same errors: that they agree is no evidence that either is right.
+        Two engines with the same discretisation make the same errors, so their agreement is no evidence that either is right.
         """
         return None
 

@@ -98,7 +98,7 @@ class Check:
 
 
 def log_check(recording: Flights | Log | str | Path) -> Check:
-    """What the flights and the rests of a recording say about its header.
+    """Compare the header of a recording with its flights, and with the body at rest.
 
     Args:
         recording: The recording, what `load_log` takes, or the flights found in it.

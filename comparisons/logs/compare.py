@@ -103,7 +103,7 @@ class LogComparison:
         dt: Time step of the engines [s].
         errors: The errors of each engine.
         pairs: The differences between engines.
-        groups: By quantity, the largest groups of engines that the tosses do not tell apart; an engine may be in several.
+        groups: By quantity, the largest groups of engines without significant differences; an engine may be in several.
         parts: The parts of the errors.
         left_out: By engine, why it has no errors.
     """

@@ -81,7 +81,7 @@ class LogFit:
         frames: Number of frames of each after its flight.
         estimates: The parameters of each engine.
         transfers: The differences between two engines, of parameters that the tosses identify with both.
-        friction: The friction whichever engine is used, with an interval that contains the differences between engines as well; None with
+        friction: The friction for any engine, with an interval that includes the differences between engines; None with
             fewer than two engines that identify it.
         discrepancies: By engine, what it leaves of these frames beside noise and errors of the start [m].
         left_out: By engine, why it has no estimate.

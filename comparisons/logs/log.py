@@ -188,7 +188,7 @@ def load_log(recording: str | Path) -> Log:
     """Load a recording.
 
     Args:
-        recording: The path of its header, a TOML file, or the name of one that dropspin has.
+        recording: The path of its header, a TOML file, or the name of one that comes with dropspin, such as `toss-cube`.
 
     Returns:
         The recording in SI units, y up, quaternions [x, y, z, w] from body to world.

@@ -106,7 +106,7 @@ def measured_scene(flights: Flights) -> Scenario | None:
 
 
 def flights_in(recording: Flights | Log | str | Path) -> Flights:
-    """The flights of a recording, which may be the path of its header or the name of one that dropspin has.
+    """The flights of a recording, which may be the path of its header or the name of one that comes with dropspin, such as `toss-cube`.
 
     Raises:
         DropspinError: It cannot be loaded, or has no flight.

@@ -64,8 +64,8 @@ class Results:
     """A run.
 
     Attributes:
-        table: One row per measurement, with the columns of `Measurement`; dt and time_per_step in s. A row without a metric says what
-            became of an engine that has no motion, or has a remark.
+        table: One row per measurement, with the columns of `Measurement`; dt and time_per_step in s. A row without a metric has the outcome
+            of an engine without a motion, or a remark.
         scenes: The scenes, by name, in the order they were run.
         engines: The engines' labels, in order.
         trajectories: By (scene, engine, dt): the motion from the scene's own start, every step.

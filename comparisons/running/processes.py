@@ -45,7 +45,7 @@ COMPILATION = 600.0
 
 @dataclass(frozen=True)
 class ResourceLimits:
-    """What an engine may use for one scene at one time step, start phases and ensemble included.
+    """The processor time and memory that an engine may use for one scene at one time step, including start phases and ensemble.
 
     Attributes:
         processor_time: Processor time [s]; ten times as much wall time is allowed.

@@ -166,7 +166,7 @@ def what_changed(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> str:
 
 
 def measure(scene: SceneLike, motion: Trajectory) -> dict[str, float]:
-    """Every metric that a scene has, of one motion.
+    """Compute every metric of a scene for one motion.
 
     Args:
         scene: A scene, its catalogue name, the path of its file, or a mapping with the same keys.

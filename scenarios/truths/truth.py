@@ -66,7 +66,7 @@ class Truth:
 
     @property
     def is_exact(self) -> bool:
-        """Whether it is an exact solution, and no measured motion."""
+        """Whether it is an exact solution instead of a measured motion."""
         return self.frames is None
 
     @property

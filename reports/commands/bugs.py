@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def bugs_command(names: tuple[str, ...], is_to_prepare: bool, environments: str, output: str, jobs: int | None, json_output: bool) -> int:
     """Show publicly reported bugs of engines, each in the releases that have it and in those that do not.
 
-    CASE is a report; the default is all. Its scene is run with each release in an environment of its own, and the result is compared
+    CASE is a reported bug; the default is all. Its scene is run with each release in an environment of its own, and the result is compared
     with the closed form of the fault.
 
     Exit code: 1 if a release does not do what was reported, 3 if one could not be run.

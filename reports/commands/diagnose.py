@@ -25,7 +25,7 @@ def diagnose_command(file: str, output: str, json_output: bool, **options: Any) 
     """Measure what the settings of your model do: an MJCF or URDF file, or a mesh (.obj, .stl).
 
     Each free body is simulated alone, with the file's own settings, above the surface that it lands on: how it falls, spins, lands,
-    rests, slides and rolls, compared with exact solutions with these settings and without them. Remedies marked "tried" were tried.
+    rests, slides and rolls, compared with exact solutions with these settings and without them. A remedy marked "tried" was simulated.
 
     Exit code: 0 no impossible inertia and no missed target, 1 otherwise, 2 bad input.
     """

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 @output_option("out/reproduce", "for the tables")
 @as_json
 def reproduce_command(names: tuple[str, ...], resources: "ResourceLimits", output: str, json_output: bool) -> int:
-    """Compare published results with what engines and exact solutions give here.
+    """Compare published results with those of engines and exact solutions in dropspin.
 
     Each SOURCE has a citation, a scene, and the digits that it prints. Its scene is run, and the values are compared digit by digit; for
     values that cannot be reproduced, the reason is printed. The default is all sources but acosta-cube, which needs DIR, a folder of
     measured tosses.
 
-    Exit code 1: a value differs that is claimed to be reproducible.
+    Exit code 1: a value that should be reproduced differs.
     """
     from dropspin.comparisons.published.sources import source_names, sources
     from dropspin.comparisons.published.study import reproduce

@@ -67,13 +67,14 @@ def overview(results: Results) -> Overview:
     )
 
 
-def document(results: Results, summary: Overview, tables: Sequence[Part] = ()) -> Document:
+def document(results: Results, summary: Overview, tables: Sequence[Part] = (), explained: Sequence[Part] = ()) -> Document:
     """A short report: the conclusion, a finding on each engine, its status in each scene, distances to other impact laws, and failures.
 
     Args:
         results: The run.
         summary: Its overview.
         tables: What a terminal shows first.
+        explained: What a terminal shows of the failures: `unexpected_failures`, whose search for causes a page does not need.
     """
     statuses = [
         {"scene": scene, **{engine: f"{status.mark} {status.words}" for engine, status in by_engine.items()}}
@@ -81,7 +82,6 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = ()) -
     ]
     laws: list[Part] = [Paragraph(NOTE), Table(summary.laws)] if summary.laws else []
     failed = [f"✗ {failure.sentence}" for failure in summary.failures]
-    unexpected = [failure for failure in summary.failures if not failure.accepted]
     listed = Sentences(failed, commands=[failure.reproduce for failure in summary.failures], on_terminal=False)
     versions = ", ".join(f"{name} {version or 'not installed'}" for name, version in results.provenance["versions"].items())
     matrix, notes = matrix_of(results, summary.statuses)
@@ -95,10 +95,16 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = ()) -
         Sentences([f"{words}: {meaning}" for words, meaning in legend_of_marks(summary.statuses).items()], on_terminal=False),
         *(replace(part, on_terminal=False) for part in laws),
         listed,
-        *(replace(part, on_page=False) for part in failure_parts(results, unexpected)),
+        *explained,
         Paragraph(f"{versions} on {results.provenance['cpu']}", on_terminal=False),
     ]
     return Document("dropspin", parts, [Sentences(summary.conclusion), Paragraph(summary.verdict, style="bold")])
+
+
+def unexpected_failures(results: Results, summary: Overview) -> list[Part]:
+    """The failures of a run that no baseline accepts, with what explains them, for a terminal."""
+    unexpected = [failure for failure in summary.failures if not failure.accepted]
+    return [replace(part, on_page=False) for part in failure_parts(results, unexpected)]
 
 
 def _quick(results: Results) -> list[str]:

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from dropspin.comparisons.results.results import Results
-from dropspin.reports.stories.run import document, overview
+from dropspin.reports.stories.run import document, overview, unexpected_failures
 from dropspin.reports.stories.run_tables import scene_parts
 from dropspin.reports.terminal.rows import print_document
 
@@ -19,4 +19,5 @@ def print_table(results: Results, console: "Console | None" = None, *, summary_o
         console: Rich's console to print to; None means standard output.
         summary_only: Whether to print the summary alone.
     """
-    print_document(document(results, overview(results), [] if summary_only else scene_parts(results)), console)
+    summary, tables = overview(results), [] if summary_only else scene_parts(results)
+    print_document(document(results, summary, tables, unexpected_failures(results, summary)), console)

@@ -46,6 +46,10 @@ OnProgress = Callable[[str, float], None]
 """Called with a description of the current work, and the fraction of the study that is done."""
 
 
+class NotCompared(DropspinError):
+    """No engine can be compared in a scene; the message has the reason of each."""
+
+
 def tradeoff(
     scene: SceneLike,
     engines: Engine | str | Iterable[Engine | str] = (),
@@ -77,7 +81,7 @@ def tradeoff(
 
     Raises:
         DropspinError: The scene has no exact solution, or the metric does not apply to it; the budget or a number of worlds is not above 0;
-            or no engine can be compared in the scene.
+            or, as its subclass NotCompared, no engine can be compared in the scene.
     """
     sizes = tuple(sorted(set(worlds)))
     if not all(isinstance(size, int) and 0 < size <= MOST_WORLDS for size in sizes):
@@ -114,7 +118,7 @@ def tradeoff(
     result = TradeOff(scene, chosen, points, tuple(ladders), sizes, memory, others)
     if not points:
         reasons = "; ".join(f"{label}: {why.removesuffix('.')}" for label, why in result.left_out.items())
-        raise DropspinError(f"no engine can be compared in {scene.name}: {reasons}.")
+        raise NotCompared(f"no engine can be compared in {scene.name}: {reasons}.")
     return result
 
 

@@ -41,7 +41,7 @@ def tradeoff_command(scenes: tuple[str, ...], within: tuple[float, ...], output:
     The default is the scene spin-asymmetric, with engines and methods that give different results for it.
     """
     from dropspin.comparisons.results.folder import study_folder
-    from dropspin.comparisons.tradeoff.study import tradeoff
+    from dropspin.comparisons.tradeoff.study import NotCompared, tradeoff
     from dropspin.reports.stories.tradeoff import TradeOffs
     from dropspin.reports.study_files import write_study
     from dropspin.reports.terminal.progress import share_bar
@@ -51,8 +51,13 @@ def tradeoff_command(scenes: tuple[str, ...], within: tuple[float, ...], output:
     loaded, results = [load(name) for name in scenes or ("spin-asymmetric",)], []
     with study_folder(output) as folder:
         for scene in loaded:
-            with share_bar(scene.name) as on_progress:
-                results.append(tradeoff(scene, **options, on_progress=on_progress))
+            try:
+                with share_bar(scene.name) as on_progress:
+                    results.append(tradeoff(scene, **options, on_progress=on_progress))
+            except NotCompared as error:
+                if scene is loaded[-1] and not results:
+                    raise
+                click.echo(f"left out: {error}", err=True)
         study = TradeOffs(scenes=results, within=within)
         document = write_study(study, folder)
     print_json_or(json_output, study.rows(), document, os.path.join(output, "tradeoff.md"))

@@ -47,6 +47,19 @@ def test_pareto_front_recommendations_and_files(tmp_path):
     assert all(row["cost_per_world_256"] > 0.0 for row in compared)
 
 
+def test_scene_in_which_no_engine_can_be_compared_leaves_the_others(tmp_path):
+    (tmp_path / "short.toml").write_text(SCENE)
+    asked = ("tradeoff", "-e", "wang[rotation=exact]", "--metric", "position_error", "--budget", "0.1", "-o", "out")
+    declined = dropspin(*asked, "drop-ball-slipping", cwd=tmp_path)
+    assert declined.returncode == 2
+    done = dropspin(*asked, "drop-ball-slipping", "fall-spin", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    reason = declined.stderr.strip().splitlines()[-1].removeprefix("dropspin: ")
+    assert reason.startswith("no engine can be compared in drop-ball-slipping: wang[rotation=exact]")
+    assert f"left out: {reason}" in done.stderr.splitlines()
+    assert {row["scene"] for row in json.loads((tmp_path / "out" / "tradeoff.json").read_text())} == {"fall-spin"}
+
+
 def test_budget_is_an_option_with_the_default_of_the_study(tmp_path):
     """A budget that any run exceeds ends every ladder at its first step, and the output says so."""
     [option] = [one for one in tradeoff_command.params if one.name == "budget"]

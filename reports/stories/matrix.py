@@ -20,16 +20,16 @@ least severe findings.
 WITHOUT_FINDING = frozenset({"passed", "measured", "declined", "no_truth"})
 
 MEANINGS = {
-    "passed": "every check is within its bound; a large error passes if it has no bound at this time step and vanishes as dt → 0",
-    f"passed ({UNDECIDED})": "every check is within its bound, but the time steps do not show whether each error vanishes as dt → 0",
+    "passed": "within every bound; an error without bound vanishes as dt → 0",
+    f"passed ({UNDECIDED})": "as passed, but an error may remain as dt → 0",
     "failed": "a check is outside its bound",
     "failed (diverged)": "a state was not finite, or the engine reported a breakdown",
     "failed (crashed)": "the process of the engine ended",
     "failed (timed out)": "the engine exceeded the time limit",
     "failed (broken)": "the adapter cannot be loaded",
     "known fault": "an error that the scene expects of this engine by name",
-    f"known fault ({MODEL_ERROR})": "an error that the scene expects of this engine by name, and that does not vanish as dt → 0",
-    "not judged (limited)": "a check, perhaps of another metric, fails, and a known limitation of the engine explains an error this large",
+    f"known fault ({MODEL_ERROR})": "expected too, and it remains as dt → 0",
+    "not judged (limited)": "a known limitation explains a failed check",
     "not judged (measured)": "the results have no bounds",
     f"not judged ({UNDECIDED})": "the results have no bounds, and the time steps do not show whether each error vanishes as dt → 0",
     "not judged (no exact solution)": "there is no exact solution to compare with",
@@ -37,10 +37,7 @@ MEANINGS = {
     "not judged (missing)": "the engine is not installed",
 }
 """What each status of an engine in a scene means; the status is the worst over all metrics and time steps."""
-CHOICE = (
-    "Error: in the metric with the largest known fault, limitation or failure of the scene; without one, in bounce height, else "
-    "orientation, else position."
-)
+CHOICE = "Error: the largest known fault, limitation or failure, else the leading metric."
 """Which error a row of the matrix shows."""
 
 

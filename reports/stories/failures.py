@@ -227,7 +227,7 @@ def reproduce_drawn(results: Results) -> list[str]:
 def _command(
     scenes: Sequence[str], engines: Sequence[str], dts: Sequence[float], asked: Mapping[str, Any], more: Sequence[str] = ()
 ) -> str:
-    """The command that runs scenes again at time steps [s]; as asked, it is quick, or has a time limit that is not the default one."""
+    """The command that runs scenes again at time steps [s], with `--quick` and `--time-limit` if the run had them."""
     words = [word for engine in engines for word in ("-e", engine)] + [word for dt in dts for word in ("--dt", repr(float(dt)))]
     words += ["--quick"] * asked.get("quick", False)
     limit = asked["time_limit"]

@@ -54,9 +54,9 @@ class FittedLog(Study):
         if fit.friction:
             rows.append({"engine": fit.friction.engine, "friction": interval(fit.friction), "restitution": "", "discrepancy": ""})
         legend = (
-            f"From {fit.frames} frames after the flight of each of {fit.tosses} tosses, with 95 % intervals. The discrepancy is the "
-            "difference from the recorded positions that neither noise nor errors of the start explain. The interval of an engine holds "
-            "for this engine only; that of any engine includes the differences between engines."
+            f"Fitted to the first {fit.frames} frames after the flight of each of {fit.tosses} tosses, with 95 % intervals. The "
+            "discrepancy is the difference from the recorded positions that neither noise nor errors of the initial states explain. The "
+            "interval of an engine holds for this engine only; that in the row any engine includes the differences between engines."
         )
         unknown = [
             f"{row.parameter.capitalize()} is not identified with {row.engine}: {NOT_IDENTIFIED[row.parameter]}."

@@ -20,7 +20,7 @@ least severe findings.
 WITHOUT_FINDING = frozenset({"passed", "measured", "declined", "no_truth"})
 
 MEANINGS = {
-    "passed": "within every bound; an error without bound vanishes as dt → 0",
+    "passed": "within every bound; an error without a bound falls to 0 with dt",
     f"passed ({UNDECIDED})": "as passed, but an error may remain as dt → 0",
     "failed": "a check is outside its bound",
     "failed (diverged)": "a state was not finite, or the engine reported a breakdown",
@@ -28,8 +28,8 @@ MEANINGS = {
     "failed (timed out)": "the engine exceeded the time limit",
     "failed (broken)": "the adapter cannot be loaded",
     "known fault": "an error that the scene expects of this engine by name",
-    f"known fault ({MODEL_ERROR})": "expected too, and it remains as dt → 0",
-    "not judged (limited)": "a known limitation explains a failed check",
+    f"known fault ({MODEL_ERROR})": "an error that the scene expects of this engine by name, and that remains as dt → 0",
+    "not judged (limited)": "a known limitation causes an error beyond its bound",
     "not judged (measured)": "the results have no bounds",
     f"not judged ({UNDECIDED})": "the results have no bounds, and the time steps do not show whether each error vanishes as dt → 0",
     "not judged (no exact solution)": "there is no exact solution to compare with",
@@ -103,6 +103,8 @@ def matrix_of(results: Results, statuses: Mapping[str, Mapping[str, Status]]) ->
 def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> dict[str, str]:
     """What each status of a run means, by its mark and words, in the order of `MEANINGS`."""
     shown = {status.words: status.mark for by_engine in statuses.values() for status in by_engine.values()}
+    if "known fault" in shown:  # whose line serves for the model errors, too
+        shown.pop(f"known fault ({MODEL_ERROR})", None)
     return {f"{shown[words]} {words}": meaning for words, meaning in MEANINGS.items() if words in shown}
 
 

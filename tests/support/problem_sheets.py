@@ -75,8 +75,8 @@ def sheet(problem):
 
 
 EXACT = "A solution that claims to be exact agrees with every printed digit, within one unit of the last. "
-TOLERANCE = """A solution by time steps counts as correct at the time step dt if it is within the bounds below on absolute values,
-which are those for every engine; the scene's file has their reasons ([how metrics are computed](../figures.md))."""
+TOLERANCE = """A numerical solution with the time step dt counts as correct if the absolute value of each metric below is within
+its bound. The bounds are the same for every engine; the scene's file has their reasons ([how metrics are computed](../figures.md))."""
 ENERGY = """ The scene's energy is M |g| H, with H the height of the lowest point above the floor at the start, or the body's largest
 distance from the centre of mass if it starts on the floor, or the kinetic energy at the start, whichever is larger; without a floor, the
 largest kinetic energy."""

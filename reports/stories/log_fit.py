@@ -55,9 +55,10 @@ class FittedLog(Study):
             rows.append({"engine": fit.friction.engine, "friction": interval(fit.friction), "restitution": "", "discrepancy": ""})
         legend = (
             f"Fitted to the first {fit.frames} frames after the flight of each of {fit.tosses} tosses, with 95 % intervals. The "
-            "discrepancy is the difference from the recorded positions that neither noise nor errors of the initial states explain. The "
-            "interval of an engine holds for this engine only; that in the row any engine includes the differences between engines."
+            "discrepancy is the difference from the recorded positions that neither noise nor errors of the initial states explain."
         )
+        if fit.friction:
+            legend += " The interval of an engine holds for it alone; that in the row of any engine includes the differences between them."
         unknown = [
             f"{row.parameter.capitalize()} is not identified with {row.engine}: {NOT_IDENTIFIED[row.parameter]}."
             for row in fit.estimates

@@ -96,8 +96,11 @@ def _residual(flights: Flights, *, equal_steps: bool) -> float:
 
 def of_frames(flights: Flights) -> Iterator[Finding]:
     """Of frames that are missing or repeated, of tosses without a flight, and of what the file shows by itself."""
-    times_are_right = _residual(flights, equal_steps=False) <= BETTER * _residual(flights, equal_steps=True)
-    yield from (finding for finding in flights.log.irregularities if finding.kind != "jitter" or not times_are_right)
+    irregularities = flights.log.irregularities
+    if any(finding.kind == "jitter" for finding in irregularities):
+        times_are_right = _residual(flights, equal_steps=False) <= BETTER * _residual(flights, equal_steps=True)
+        irregularities = tuple(finding for finding in irregularities if finding.kind != "jitter" or not times_are_right)
+    yield from irregularities
     for toss, flight in zip(flights.log.tosses, flights.flights, strict=True):
         if flight is None:
             yield Finding("no flight", 0.0, FEWEST_FRAMES, toss.name)

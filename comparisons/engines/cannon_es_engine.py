@@ -9,7 +9,7 @@ import numpy as np
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.node_engine import NodeEngine
-from dropspin.comparisons.engines.options import Setting
+from dropspin.comparisons.engines.options import Setting, calibrated_values
 from dropspin.comparisons.engines.packages import CANNON_ES
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import rotate
@@ -77,7 +77,7 @@ class CannonES(NodeEngine):
             return {"world": {}, "solver": {}, "contact": contact, "body": damping if scene.damping else {}}
         share = abs(float(scene.acceleration[1])) * dt / _touching(scene) if floor and not isinstance(floor.friction, str) else 1.0
         solver = {"iterations": SOLVER["iterations"].calibrated, "tolerance": 1e-12 * scene.body.mass}
-        relaxed = {name: setting.calibrated for name, setting in CONTACT.items() if setting.calibrated is not None}
+        relaxed = calibrated_values(CONTACT)
         return {"world": {"frictionGravity": share}, "solver": solver, "contact": contact | relaxed if floor else {}, "body": damping}
 
 

@@ -15,6 +15,7 @@ from pydrake.systems.framework import DiagramBuilder
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
 from dropspin.comparisons.engines.drake_settings import PLANT, REASONS, SETTINGS
+from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import ORIENTATION, Array
@@ -54,7 +55,7 @@ class Drake(Engine):
         friction = mapping.friction_of(floor, gripping=1e6)
         chosen: dict[str, Any] = {"friction": friction, "floor_friction": friction}
         if not self.is_default:
-            chosen |= {name: setting.calibrated for name, setting in SETTINGS.items() if setting.calibrated is not None}
+            chosen |= calibrated_values(SETTINGS)
             chosen["discrete_contact_approximation"] = "sap" if isinstance(floor.friction, str) else "tamsi"
             chosen["stiffness"] = (1e9 * scene.body.mass, 1e12 * scene.body.mass)
         return chosen | self.given

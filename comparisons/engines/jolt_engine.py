@@ -6,7 +6,7 @@ import numpy as np
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.node_engine import OFF_ON, NodeEngine
-from dropspin.comparisons.engines.options import Setting
+from dropspin.comparisons.engines.options import Setting, calibrated_values
 from dropspin.comparisons.engines.packages import JOLT
 from dropspin.scenarios import Scenario
 
@@ -90,5 +90,4 @@ class Jolt(NodeEngine):
             return {"system": {}, "body": damping if scene.damping else {}, "surface": surface}
         fall = float(np.linalg.norm(scene.acceleration)) * dt**2
         system = {"mMinVelocityForRestitution": floor.rest_speed if floor else 0.0, "mSpeculativeContactDistance": fall}
-        calibrated, body = ({name: one.calibrated for name, one in group.items() if one.calibrated is not None} for group in (SYSTEM, BODY))
-        return {"system": calibrated | system, "body": body | damping, "surface": surface}
+        return {"system": calibrated_values(SYSTEM) | system, "body": calibrated_values(BODY) | damping, "surface": surface}

@@ -96,6 +96,11 @@ class Setting(NamedTuple):
         return int(numbers[0]) if isinstance(self.default, int) else numbers[0]
 
 
+def calibrated_values(settings: Mapping[str, Setting]) -> dict[str, Value]:
+    """The values of the calibrated profile that are neither the library's own nor computed."""
+    return {name: setting.calibrated for name, setting in settings.items() if setting.calibrated is not None}
+
+
 @dataclass(frozen=True)
 class Configured:
     """What has a name and options.

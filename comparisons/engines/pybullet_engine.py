@@ -24,7 +24,7 @@ from dropspin.comparisons.engines.mapping import (
     refusal_of_hull,
     refusal_of_neighbour,
 )
-from dropspin.comparisons.engines.options import Setting
+from dropspin.comparisons.engines.options import Setting, calibrated_values
 from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.engines.pybullet_limitations import LARGEST_TURN, MOST_BALLS, STRONGEST_FRICTION
 from dropspin.comparisons.engines.pybullet_settings import BODY, FASTEST, FLOOR, NEVER_SLEEPS, SETTINGS, WORLD
@@ -141,7 +141,7 @@ class PyBullet(Engine):
             "solverResidualThreshold": (RESIDUAL * float(np.linalg.norm(scene.acceleration)) * dt) ** 2,
             "restitutionVelocityThreshold": 0.0 if scene.floor is None else scene.floor.rest_speed,
         }
-        return {name: one.calibrated for name, one in WORLD.items() if one.calibrated is not None} | computed | self._given(WORLD)
+        return calibrated_values(WORLD) | computed | self._given(WORLD)
 
     def _dynamics(self, scene: Scenario) -> dict[str, Any]:
         """The properties of the body: contact, damping, sleep and clamp.

@@ -14,6 +14,7 @@ import rapier3d
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation
+from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.rapier_scenes import damping_of, refusal, surface_of
 from dropspin.comparisons.engines.rapier_settings import BODY, OFF_ON, REASONS, SETTINGS, WORLD
@@ -54,7 +55,7 @@ class RapierSimulation(Simulation):
         parameters: dict[str, Any] = {"dt": dt}
         dynamics: dict[str, Any] = {f"{motion}_damping": rate for motion, rate in scene.damping.rates.items()} if scene.damping else {}
         if not engine.is_default:
-            parameters |= {name: one.calibrated for name, one in WORLD.items() if one.calibrated is not None}
+            parameters |= calibrated_values(WORLD)
             parameters |= {"friction_in_bias_pass": True}
             parameters |= {"normalized_prediction_distance": float(np.linalg.norm(scene.acceleration)) * dt**2}
             dynamics = {"can_sleep": False, "allow_fast_rotation": True, "gyroscopic_forces": gyroscopic} | damping

@@ -11,6 +11,7 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
 from dropspin.comparisons.engines.mapping import PROFILES, SEMI_IMPLICIT_EULER, built, friction_of, may_tumble, principal_frame
+from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.sapien_settings import BODY, GRIPPING, OFF_ON, REASONS, SETTINGS, WORLD
 from dropspin.scenarios.bodies import Body, Sphere
@@ -54,7 +55,7 @@ class Sapien(Engine):
         if not self.is_default:
             has_coefficient = floor is not None and not isinstance(floor.friction, str)
             chosen |= {"enable_tgs": OFF_ON[has_coefficient], "bounce_threshold": max(floor.rest_speed if floor else 0.0, 1e-9)}
-            chosen |= {name: setting.calibrated for name, setting in SETTINGS.items() if setting.calibrated is not None}
+            chosen |= calibrated_values(SETTINGS)
             chosen["solver_position_iterations"] = 4 if has_coefficient else 100
         if damping is not None or not self.is_default:
             for motion in ("linear", "angular"):

@@ -97,8 +97,11 @@ class Engine(Configured, ABC):
     """
     mixes_scenes: ClassVar[bool] = False
     """Whether the scenes of a batch may differ in all numbers (masses, sizes, gravity, floors), not only in their starts."""
-    reasons: ClassVar[Mapping[str, str]] = {}
-    """The reason for the value of each setting of a calibrated simulation, by the names in `Simulation.settings`."""
+
+    @property
+    def reasons(self) -> Mapping[str, str]:
+        """The reason for the value of each setting of a calibrated simulation, by the names in `Simulation.settings`."""
+        return {name: setting.why for name, setting in self.settings.items() if setting.why}
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> "BatchSimulation | None":
         """Build scenes that differ in their starts, or in other numbers if the engine `mixes_scenes`, and have as many steps.

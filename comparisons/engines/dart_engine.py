@@ -7,8 +7,9 @@ import numpy as np
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, KnownLimitation, Simulation
-from dropspin.comparisons.engines.dart_settings import OFF_ON, REASONS, SETTINGS
+from dropspin.comparisons.engines.dart_settings import SETTINGS, WORLD
 from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE
+from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.bodies import Box
 from dropspin.scenarios.model import Scenario
@@ -22,7 +23,7 @@ DETECTORS = {"dart": "DARTCollisionDetector", "bullet": "BulletCollisionDetector
 class Dart(Engine):
     """DART's rigid body over a plane or box, or its defaults."""
 
-    name, order, reasons = "dart", 1.0, REASONS
+    name, order = "dart", 1.0
     shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
@@ -45,10 +46,10 @@ class Dart(Engine):
     def chosen(self, floor: Floor) -> dict[str, Any]:
         """The settings for a floor."""
         restitution, friction = floor.restitution, mapping.friction_of(floor, gripping=1e6)
-        world: dict[str, Any] = {name: setting.default for name, setting in SETTINGS.items() if setting.values}
+        world: dict[str, Any] = {name: setting.default for name, setting in WORLD.items()}
         if not self.is_default:
             restitution = min(1.0, restitution + (1.0 + restitution) * 1e-5)
-            world |= {name: SETTINGS[name].calibrated for name in world if not SETTINGS[name].is_computed}
+            world |= calibrated_values(WORLD)
             world["lcp_solver"] = "dantzig" if isinstance(floor.friction, str) else "nsgs"
         surfaces = {"restitution": restitution, "friction": friction, "floor_restitution": 1.0, "floor_friction": friction}
         return world | surfaces | self.given
@@ -90,11 +91,11 @@ class DartSimulation(Simulation):
     def _add_floor(self, kind: str, chosen: dict[str, Any]) -> dict[str, Any]:
         """Set the world's settings and add the floor; the settings, those of the world read back."""
         solver, sleep = self._world.getConstraintSolver(), dart.simulation.DeactivationOptions()
-        sleep.mEnabled = chosen["deactivation"] == "true"
+        sleep.mEnabled = chosen["deactivation"]
         self._world.setDeactivationOptions(sleep)
         if chosen["collision_detector"] in DETECTORS:
             self._world.setCollisionDetector(getattr(dart.collision, DETECTORS[chosen["collision_detector"]])())
-        solver.setSplitImpulseEnabled(chosen["split_impulse"] == "true")
+        solver.setSplitImpulseEnabled(chosen["split_impulse"])
         if chosen["lcp_solver"] == "nsgs":
             options = dart.constraint.NsgsFrictionSolver.Options()
             options.tolerance = 1e-8
@@ -111,7 +112,7 @@ class DartSimulation(Simulation):
         lcp = solver.getBoxedLcpSolver().getType().removesuffix("BoxedLcpSolver").removesuffix("FrictionSolver").lower()
         switches = solver.isSplitImpulseEnabled(), self._world.getDeactivationOptions().mEnabled
         found = {"collision_detector": self._world.getCollisionDetector().getType(), "lcp_solver": lcp}
-        return chosen | found | dict(zip(("split_impulse", "deactivation"), (OFF_ON[is_on] for is_on in switches), strict=True))
+        return chosen | found | dict(zip(("split_impulse", "deactivation"), switches, strict=True))
 
     def advance(self, steps: int) -> None:
         for _ in range(steps):

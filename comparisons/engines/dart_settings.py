@@ -2,14 +2,12 @@
 
 from dropspin.comparisons.engines.options import Setting
 
-OFF_ON = ("false", "true")
-SETTINGS = {
+WORLD = {
     "deactivation": Setting(
-        "true",
+        True,
         "bodies at rest fall asleep",
-        "false",
+        False,
         "never falls asleep; else a block that tips over more slowly than 0.05 rad/s stops halfway",
-        values=OFF_ON,
     ),
     "collision_detector": Setting(
         "fcl",
@@ -19,11 +17,10 @@ SETTINGS = {
         values=("fcl", "dart", "bullet", "ode"),
     ),
     "split_impulse": Setting(
-        "false",
+        False,
         "depth is corrected apart from velocities",
-        "true",
+        True,
         "corrects depth without changing velocities; else a ball of restitution 0 rebounds at 1 mm/s, at any step",
-        values=OFF_ON,
     ),
     "lcp_solver": Setting(
         "dantzig",
@@ -32,6 +29,9 @@ SETTINGS = {
         values=("dantzig", "pgs", "nsgs"),
         is_computed=True,
     ),
+}
+"""Of the world."""
+SETTINGS = WORLD | {
     "restitution": Setting(
         0.0,
         "of the body, multiplied by that of the floor",
@@ -48,5 +48,4 @@ SETTINGS = {
     "floor_restitution": Setting(0.0, "of the floor", 1.0, "DART multiplies the two", most=1.0),
     "floor_friction": Setting(1.0, "of the floor", is_computed=True),
 }
-REASONS = {name: setting.why for name, setting in SETTINGS.items() if setting.why}
 """Effects were measured on balls dropped from 1 m and boxes on an edge, tipping and turning flat, without the one setting."""

@@ -14,7 +14,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
-from dropspin.comparisons.engines.drake_settings import PLANT, REASONS, SETTINGS
+from dropspin.comparisons.engines.drake_settings import PLANT, SETTINGS
 from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.model import Scenario
@@ -29,9 +29,7 @@ LONGEST = 1e150
 class Drake(Engine):
     """Drake's rigid body in its discrete plant."""
 
-    name = "drake"
-    order = 1.0
-    reasons = REASONS
+    name, order = "drake", 1.0
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
     settings: ClassVar = SETTINGS

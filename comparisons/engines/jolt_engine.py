@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dropspin.comparisons.engines import mapping
-from dropspin.comparisons.engines.node_engine import OFF_ON, NodeEngine
+from dropspin.comparisons.engines.node_engine import NodeEngine
 from dropspin.comparisons.engines.options import Setting, calibrated_values
 from dropspin.comparisons.engines.packages import JOLT
 from dropspin.scenarios import Scenario
@@ -14,11 +14,10 @@ GRIPPING, SLOWEST = 1e6, 0.01
 SYSTEM = {
     "mPenetrationSlop": Setting(0.02, "depth that is not corrected", 0.0, "m; else a body stays as deep as it lands, up to 2 cm", "m"),
     "mUseBodyPairContactCache": Setting(
-        "true",
+        True,
         "contacts are kept while a body hardly moves",
-        "false",
+        False,
         "normals that are kept turn with the body; a stick that slips errs by 1.1 cm, not 0.9 mm",
-        values=OFF_ON,
     ),
     "mMinVelocityForRestitution": Setting(
         1.0,
@@ -40,12 +39,8 @@ SYSTEM = {
 }
 """Of the physics system."""
 BODY = {
-    "mAllowSleeping": Setting(
-        "true", "the body may fall asleep", "false", "by default bodies slower than 0.03 m/s sleep after 0.5 s", values=OFF_ON
-    ),
-    "mApplyGyroscopicForce": Setting(
-        "false", "the gyroscopic term", "true", "off by default; a tumbling body then keeps its angular velocity", values=OFF_ON
-    ),
+    "mAllowSleeping": Setting(True, "the body may fall asleep", False, "by default bodies slower than 0.03 m/s sleep after 0.5 s"),
+    "mApplyGyroscopicForce": Setting(False, "the gyroscopic term", True, "off by default; a tumbling body then keeps its angular velocity"),
     "mMaxLinearVelocity": Setting(500.0, "largest speed", 1e15, "m/s, 500 by default", "m/s"),
     "mMaxAngularVelocity": Setting(47.12389, "largest spin", 1e15, "rad/s, 47 by default", "rad/s"),
     "mLinearDamping": Setting(
@@ -64,14 +59,13 @@ SURFACE = {
         0.2, "of body and floor", why=f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution", is_computed=True
     ),
 }
-REASONS = {name: setting.why for name, setting in (SYSTEM | BODY | SURFACE).items() if setting.why}
 """Effects were measured at 1 ms without the one setting."""
 
 
 class Jolt(NodeEngine):
     """A rigid body of Jolt in Node.js."""
 
-    name, package, order, precision, reasons = "jolt", JOLT, 1.0, np.float32, REASONS
+    name, package, order, precision = "jolt", JOLT, 1.0, np.float32
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
     groups: ClassVar = {"system": SYSTEM, "body": BODY, "surface": SURFACE}

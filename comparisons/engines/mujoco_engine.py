@@ -132,7 +132,7 @@ class MuJoCo(Engine):
             raise DropspinError(f"engine {self.label!r}: a spring takes at least {FEWEST_SPRING_STEPS} steps; 0 is the damper.")
 
     @property
-    def reasons(self) -> Mapping[str, str]:  # type: ignore[override]  # they depend on the options
+    def reasons(self) -> Mapping[str, str]:  # they depend on the options
         """Why each setting is what it is."""
         return REASONS | ({"solref": SPRING} if "spring_steps" in self.options else {})
 

@@ -18,7 +18,6 @@ from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.state import PARTS
 
-OFF_ON = ("false", "true")
 NUMBERS = count()
 """Of the worlds in Node.js."""
 
@@ -38,11 +37,10 @@ class NodeEngine(Engine):
         """The engine's settings for a scene at a time step [s], as the driver takes them, but for those that are given."""
 
     def chosen(self, scene: Scenario, dt: float) -> dict[str, Any]:
-        """The settings with those that are given; switches are true or false."""
+        """The settings with those that are given."""
         chosen = self.world_settings(scene, dt)
         for group, settings in self.groups.items():
-            values = chosen[group] | {name: value for name, value in self.given.items() if name in settings}
-            chosen[group] = {name: value == "true" if value in OFF_ON else value for name, value in values.items()}
+            chosen[group] |= {name: value for name, value in self.given.items() if name in settings}
         return chosen
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
@@ -62,8 +60,7 @@ class NodeSimulation(Simulation):
         answer, _ = self._node.ask("open", world=self._world, settings=engine.chosen(scene, dt), **given)
         self._built, self.velocity_lag = answer.get("built"), 0.5 * dt / answer["substeps"]
         self._state = self._ask(0)[0]
-        shown = {name: OFF_ON[value] if isinstance(value, bool) else value for name, value in answer["settings"].items()}
-        self.settings = {"version": self._node.version, **options, **shown}
+        self.settings = {"version": self._node.version, **options, **answer["settings"]}
 
     def _ask(self, steps: int, every: int = 1) -> Array:
         """States now and after each `every` of some steps."""

@@ -3,8 +3,9 @@
 ODE solves the contacts of a step together, with the limits of friction of the normal forces that there are without friction.
 """
 
+from collections.abc import Mapping
 from ctypes import byref, sizeof, string_at
-from math import hypot
+from math import hypot, inf
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,35 +13,25 @@ import odepy as ode
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Engine, Simulation
+from dropspin.comparisons.engines.ode_settings import BODY, GRIPPING, SETTINGS, SURFACE, WORLD
+from dropspin.comparisons.engines.options import Setting, calibrated_values
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.state import PARTS
-from dropspin.scenarios.surfaces import Floor
 
-CONTACTS = 8
-"""Points of a contact at most; a box on a plane has four."""
-GRIPPING = 1e6
-REASONS = {
-    "mu": f"of the normal force, by default a force in N; {GRIPPING:g} where the floor grips, for infinity needs no normal force",
-    "friction_direction": "along the slip; along the world's axes, as by default, a turning box errs by 0.23 in angular momentum",
-    "soft_erp": "adds no velocity that corrects depth; 0.2 by default",
-    "finite_rotation": "turns by ω dt; by 2 atan(ω dt/2) by default",
-    "bounce_vel": "m/s, the scene's rest speed",
-    "linear_damping": "1 - exp(-rate dt), of a step; angular_damping is the same",
-}
-"""Effects were measured at 1 ms without the one setting."""
-
+CONTACTS = 8  # points of a contact at most; a box on a plane has four
 ode.dInitODE2(0)
 
 
 class ODE(Engine):
     """A rigid body of ODE, the Open Dynamics Engine."""
 
-    name, order, reasons = "ode", 1.0, REASONS
+    name, order = "ode", 1.0
     shapes: ClassVar = ("sphere", "box")
-    choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box"), "beside": mapping.BESIDE}
+    choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box"), "beside": mapping.BESIDE, "solver": ("step", "quick")}
     representations: ClassVar = ("floor", "beside")
+    settings: ClassVar = SETTINGS
 
     def declines(self, scene: Scenario) -> str | None:
         return mapping.refusal_of_floor(scene, self.option("floor"))
@@ -53,34 +44,38 @@ class ODESimulation(Simulation):
     """A world of ODE."""
 
     def __init__(self, scene: Scenario, dt: float, engine: ODE) -> None:
-        self.velocity_lag, self._dt, self._calibrated = 0.5 * dt, dt, not engine.is_default
+        self.velocity_lag, self._dt = 0.5 * dt, dt
         self._world, self._joints, self._contacts = ode.dWorldCreate(), ode.dJointGroupCreate(0), (ode.dContact * CONTACTS)()
-        cfm = 1e-10 / scene.body.mass
+        rates, options = scene.damping.rates if scene.damping else {}, {name: engine.option(name) for name in engine.choices}
+        chosen: dict[str, Any] = {f"{motion.title()}Damping": float(-np.expm1(-rate * dt)) for motion, rate in rates.items()}
+        if floor := scene.floor:
+            chosen |= {"mu": mapping.friction_of(floor, GRIPPING), "bounce": floor.restitution, "bounce_vel": floor.rest_speed}
+        if not engine.is_default:
+            chosen |= calibrated_values(SETTINGS) | {"CFM": 1e-10 / scene.body.mass}
+        chosen |= engine.given
         ode.dWorldSetGravity(self._world, *scene.acceleration)
-        ode.dWorldSetCFM(self._world, cfm if self._calibrated else 1e-10)
-        rates = scene.damping.rates if scene.damping else {}
-        self._damping = {f"{motion}_damping": float(-np.expm1(-rate * dt)) for motion, rate in rates.items()}
-        options = {name: engine.option(name) for name in engine.choices}
-        build = string_at(ode.dGetConfiguration()).decode()
-        surface = self._set_surface(scene.floor) if scene.floor else {}
-        self._floor = _floor(options["floor"]) if scene.floor else None
-        self._bodies = [self._add(one) for one in mapping.bodies_in(scene, options["beside"])]
-        rotation = {"finite_rotation": self._calibrated}
-        self.settings = {"version": version("ode-python"), "build": build, **options, **rotation, **self._damping, **surface}
+        _set("World", self._world, WORLD, chosen)
+        self._step = ode.dWorldStep if options["solver"] == "step" else ode.dWorldQuickStep
+        surface = self._set_surface(chosen) if floor else {}
+        self._floor = _floor(options["floor"]) if floor else None
+        self._bodies = [self._add(one, chosen) for one in mapping.bodies_in(scene, options["beside"])]
+        build = {"version": version("ode-python"), "build": string_at(ode.dGetConfiguration()).decode()}
+        self.settings = build | options | _in_force("World", self._world, WORLD) | _in_force("Body", self._bodies[0][0], BODY) | surface
 
-    def _set_surface(self, floor: Floor) -> dict[str, Any]:
-        """Give the contacts the floor's restitution and friction; the settings."""
-        given = {"mu": mapping.friction_of(floor, GRIPPING), "bounce": floor.restitution, "bounce_vel": floor.rest_speed}
-        mode = ode.dContactSoftERP | ode.dContactApprox1 | ode.dContactFDir1 if self._calibrated else 0
+    def _set_surface(self, chosen: Mapping[str, Any]) -> dict[str, Any]:
+        """Give the contacts the settings of a surface; those in force, but for what ODE takes from the world."""
+        values = {"Approx1": False, "FDir1": False} | {name: value for name, value in chosen.items() if name in SURFACE}
+        self._follows_slip, mode = values["FDir1"], ode.dContactBounce
+        for name, flag in (("Approx1", "Approx1"), ("FDir1", "FDir1"), ("soft_erp", "SoftERP"), ("soft_cfm", "SoftCFM")):
+            mode |= getattr(ode, f"dContact{flag}") if values.get(name, False) is not False else 0
         for contact in self._contacts:
-            contact.fdir1[0] = 1.0
-            contact.surface.mode = mode | ode.dContactBounce
-            for name, value in given.items():
-                setattr(contact.surface, name, value)
-        return given | ({"soft_erp": 0.0, "friction_direction": "slip"} if self._calibrated else {})
+            contact.fdir1[0], contact.surface.mode = 1.0, mode
+            for name in values.keys() - {"Approx1", "FDir1"}:
+                setattr(contact.surface, name, values[name])
+        return values
 
-    def _add(self, scene: Scenario) -> tuple[Any, Any]:
-        """Add a scene's body; its handle, and that of its shape."""
+    def _add(self, scene: Scenario, chosen: Mapping[str, Any]) -> tuple[Any, Any]:
+        """Add a scene's body with its settings; its handle, and that of its shape."""
         handle, mass, body = ode.dBodyCreate(self._world), ode.dMass(), scene.body
         mass.mass, mass.I[:] = body.mass, np.pad(body.inertia_tensor, ((0, 0), (0, 1))).ravel().tolist()
         ode.dBodySetMass(handle, byref(mass))
@@ -89,15 +84,10 @@ class ODESimulation(Simulation):
         ode.dBodySetQuaternion(handle, ode.dQuaternion(*np.roll(q, 1)))
         ode.dBodySetLinearVel(handle, *v)
         ode.dBodySetAngularVel(handle, *w)
-        ode.dBodySetFiniteRotationMode(handle, int(self._calibrated))
-        if self._damping:
-            ode.dBodySetDamping(handle, *self._damping.values())
-            ode.dBodySetLinearDampingThreshold(handle, 0.0)
-            ode.dBodySetAngularDampingThreshold(handle, 0.0)
+        _set("Body", handle, BODY, chosen)
         if scene.floor is None:
             return handle, None
-        size = 2.0 * body.vertices.max(0)
-        shape = ode.dCreateSphere(None, body.size) if isinstance(body, Sphere) else ode.dCreateBox(None, *size)
+        shape = ode.dCreateSphere(None, body.size) if isinstance(body, Sphere) else ode.dCreateBox(None, *2.0 * body.vertices.max(0))
         ode.dGeomSetBody(shape, handle)
         return handle, shape
 
@@ -108,7 +98,7 @@ class ODESimulation(Simulation):
         for contact in self._contacts[:count]:
             ode.dBodyGetPointVel(handle, *contact.geom.pos[:3], slip)
             speed = hypot(slip[0], slip[2])
-            if speed > 0.0:
+            if self._follows_slip and speed > 0.0:
                 contact.fdir1[0], contact.fdir1[2] = slip[0] / speed, slip[2] / speed
             ode.dJointAttach(ode.dJointCreateContact(self._world, self._joints, byref(contact)), handle, 0)
 
@@ -116,7 +106,7 @@ class ODESimulation(Simulation):
         for _ in range(steps):
             for handle, shape in self._bodies if self._floor else ():
                 self._touch(handle, shape)
-            ode.dWorldStep(self._world, self._dt)
+            self._step(self._world, self._dt)
             ode.dJointGroupEmpty(self._joints)
 
     def state(self) -> Array:
@@ -138,11 +128,22 @@ class ODESimulation(Simulation):
         ode.dWorldDestroy(self._world)
 
 
+def _set(kind: str, handle: Any, settings: Mapping[str, Setting], chosen: Mapping[str, Any]) -> None:
+    """Give a world or a body those of its settings that are chosen."""
+    for name in settings.keys() & chosen.keys():
+        getattr(ode, f"d{kind}Set{name}")(handle, chosen[name])
+
+
+def _in_force(kind: str, handle: Any, settings: Mapping[str, Setting]) -> dict[str, Any]:
+    """The finite settings of a world or a body, as ODE has them."""
+    values = ((name, getattr(ode, f"d{kind}Get{name}")(handle)) for name in settings)
+    return {name: type(settings[name].default)(value) for name, value in values if value < inf}
+
+
 def _floor(kind: str) -> Any:
     """The shape of the floor."""
-    half = mapping.FLOOR_HALF_SIZE
     if kind == "plane":
         return ode.dCreatePlane(None, 0.0, 1.0, 0.0, 0.0)
-    box = ode.dCreateBox(None, 2.0 * half, 2.0 * half, 2.0 * half)
-    ode.dGeomSetPosition(box, 0.0, -half, 0.0)
+    box = ode.dCreateBox(None, *[2.0 * mapping.FLOOR_HALF_SIZE] * 3)
+    ode.dGeomSetPosition(box, 0.0, -mapping.FLOOR_HALF_SIZE, 0.0)
     return box

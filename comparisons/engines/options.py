@@ -27,7 +27,7 @@ class NumericOption(NamedTuple):
     most: float
 
 
-Value = int | float | str | tuple[float, ...]
+Value = bool | int | float | str | tuple[float, ...]
 """The value of a setting."""
 SWITCH = {"false": 0, "no": 0, "off": 0, "disable": 0, "0": 0, "true": 1, "yes": 1, "on": 1, "enable": 1, "1": 1}
 """What may be written for off and for on, in small letters."""
@@ -44,7 +44,7 @@ class Setting(NamedTuple):
     """A documented setting of an engine's library, which the option of its name sets.
 
     Attributes:
-        default: The library's own value: a number (a whole one is an `int`), numbers, or one of `values`.
+        default: The library's own value: a number (a whole one is an `int`), numbers, off or on (a `bool`), or one of `values`.
         what: A description in a few words.
         calibrated: Its value in the calibrated profile; None if that is the library's own, or computed.
         why: The reason for the value in the calibrated profile.
@@ -70,6 +70,8 @@ class Setting(NamedTuple):
     @property
     def allowed(self) -> str:
         """Its allowed values in words."""
+        if isinstance(self.default, bool):
+            return "one of false, true"
         if self.values:
             return f"one of {', '.join(self.values)}"
         size = len(self.default) if isinstance(self.default, tuple) else 1
@@ -80,6 +82,8 @@ class Setting(NamedTuple):
     def parsed(self, text: str) -> Value | None:
         """A value that is written as text, such as `0.02 1`; None if it is not allowed."""
         switch = SWITCH.get(text.lower())
+        if isinstance(self.default, bool):
+            return None if switch is None else bool(switch)
         if self.values:
             word = self.values[switch] if switch is not None and len(self.values) == 2 else text
             return word if word in self.values else None
@@ -271,6 +275,8 @@ def spelled(value: Value | Sequence[float]) -> str:
     """An option's value as text: a number with six digits if these are exact, else with all; several with spaces between them."""
     if isinstance(value, str):
         return value
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, Sequence):
         return " ".join(map(spelled, value))
     return f"{value:g}" if float(f"{value:g}") == value else repr(float(value))

@@ -17,7 +17,7 @@ from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, 
 from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.rapier_scenes import damping_of, refusal, surface_of
-from dropspin.comparisons.engines.rapier_settings import BODY, OFF_ON, REASONS, SETTINGS, WORLD
+from dropspin.comparisons.engines.rapier_settings import BODY, SETTINGS, WORLD
 from dropspin.comparisons.measuring.predictions import spins_steadily
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
@@ -29,7 +29,7 @@ FIRST_PROCESS = cache(os.getpid)  # the first one that simulates; it starts Rapi
 class Rapier(Engine):
     """Rapier's rigid body on a half-space, a box or a mesh."""
 
-    name, order, precision, reasons = "rapier", 1.0, np.float32, REASONS
+    name, order, precision = "rapier", 1.0, np.float32
     shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
@@ -49,15 +49,13 @@ class RapierSimulation(Simulation):
         self._world = rapier3d.PhysicsWorld(gravity=scene.acceleration)
         if FIRST_PROCESS() != os.getpid():  # a forked process has none of those threads and would wait for them forever
             self._world.set_num_threads(1)
-        given = {name: value == "true" if value in OFF_ON else value for name, value in engine.given.items()}
+        given = engine.given
         gyroscopic = mapping.may_tumble(scene) and (scene.floor is not None or not spins_steadily(scene))
         damping = {f"{motion}_damping": rate for motion, rate in damping_of(scene, dt).items()}
         parameters: dict[str, Any] = {"dt": dt}
         dynamics: dict[str, Any] = {f"{motion}_damping": rate for motion, rate in scene.damping.rates.items()} if scene.damping else {}
         if not engine.is_default:
-            parameters |= calibrated_values(WORLD)
-            parameters |= {"friction_in_bias_pass": True}
-            parameters |= {"normalized_prediction_distance": float(np.linalg.norm(scene.acceleration)) * dt**2}
+            parameters |= calibrated_values(WORLD) | {"normalized_prediction_distance": float(np.linalg.norm(scene.acceleration)) * dt**2}
             dynamics = {"can_sleep": False, "allow_fast_rotation": True, "gyroscopic_forces": gyroscopic} | damping
         parameters |= {name: value for name, value in given.items() if name in WORLD}
         dynamics |= {name: value for name, value in given.items() if name in BODY}
@@ -72,8 +70,7 @@ class RapierSimulation(Simulation):
             self._world.add_collider(_floor(engine.option("floor"), surfaces[1]))
         form = {name: engine.option(name) for name in engine.choices}
         of_floor = {f"floor_{name}": value for name, value in surfaces[1].items()}
-        shown = {name: OFF_ON[value] if isinstance(value, bool) else value for name, value in (parameters | dynamics).items()}
-        self.settings = {"version": version("rapier3d"), **form, **shown, **surfaces[0], **of_floor}
+        self.settings = {"version": version("rapier3d"), **form, **parameters, **dynamics, **surfaces[0], **of_floor}
 
     def _add_body(self, scene: Scenario, dynamics: Mapping[str, Any], surface: Mapping[str, Any]) -> Any:
         """Add a scene's body with its collider, if the scene has a floor."""

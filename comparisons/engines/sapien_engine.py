@@ -13,7 +13,7 @@ from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulat
 from dropspin.comparisons.engines.mapping import PROFILES, SEMI_IMPLICIT_EULER, built, friction_of, may_tumble, principal_frame
 from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.packages import version
-from dropspin.comparisons.engines.sapien_settings import BODY, GRIPPING, OFF_ON, REASONS, SETTINGS, WORLD
+from dropspin.comparisons.engines.sapien_settings import BODY, GRIPPING, REASONS, SETTINGS, WORLD
 from dropspin.scenarios.bodies import Body, Sphere
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import Array
@@ -54,7 +54,7 @@ class Sapien(Engine):
         floor, damping, chosen = scene.floor, scene.damping, dict[str, Any]()
         if not self.is_default:
             has_coefficient = floor is not None and not isinstance(floor.friction, str)
-            chosen |= {"enable_tgs": OFF_ON[has_coefficient], "bounce_threshold": max(floor.rest_speed if floor else 0.0, 1e-9)}
+            chosen |= {"enable_tgs": has_coefficient, "bounce_threshold": max(floor.rest_speed if floor else 0.0, 1e-9)}
             chosen |= calibrated_values(SETTINGS)
             chosen["solver_position_iterations"] = 4 if has_coefficient else 100
         if damping is not None or not self.is_default:
@@ -72,7 +72,7 @@ def assign(target: Any, chosen: Mapping[str, Any], names: Iterable[str]) -> None
     """Set attributes of the names that are among the settings."""
     for name in names:
         if name in chosen:
-            setattr(target, name, chosen[name] == "true" if chosen[name] in OFF_ON else chosen[name])
+            setattr(target, name, chosen[name])
 
 
 class SapienSimulation(Simulation):

@@ -2,16 +2,14 @@
 
 from dropspin.comparisons.engines.options import Setting
 
-OFF_ON = ("false", "true")
 GRIPPING = 1e6
 FASTEST = 1e16  # m/s and rad/s
 TOLERANCE = "m; a box's contacts stay while it moves less than 1/20 of it; at SAPIEN's 0.1 a box gains 8% energy at impacts"
 WORLD = {
     "enable_tgs": Setting(
-        "true",
+        True,
         "the solver TGS, not PGS",
         why="for a coefficient: a cone; PGS has a pyramid, up to 1.41 times as strong; else PGS: TGS gains 1.3e-3 energy at impacts",
-        values=OFF_ON,
         is_computed=True,
     ),
     "bounce_threshold": Setting(
@@ -22,9 +20,9 @@ WORLD = {
         least=1e-9,
         is_computed=True,
     ),
-    "enable_pcm": Setting("true", "contacts are kept between steps", values=OFF_ON),
-    "enable_ccd": Setting("false", "contacts between steps are found", values=OFF_ON),
-    "enable_friction_every_iteration": Setting("true", "friction in each iteration of the solver", values=OFF_ON),
+    "enable_pcm": Setting(True, "contacts are kept between steps"),
+    "enable_ccd": Setting(False, "contacts between steps are found"),
+    "enable_friction_every_iteration": Setting(True, "friction in each iteration of the solver"),
 }
 """Of the scene."""
 BODY = {

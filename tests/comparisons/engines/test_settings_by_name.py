@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from support.settings import verify_settings_are_in_force
 
 from dropspin.comparisons.engines.mujoco_settings import SETTINGS, in_force
 from dropspin.comparisons.engines.options import spelled
@@ -78,14 +79,10 @@ def test_mujocos_defaults_are_those_of_the_library():
     assert {name: spelled(value) for name, value in found.items()} == {name: spelled(SETTINGS[name].default) for name in found}
 
 
-def test_mujoco_has_what_was_given():
+@pytest.mark.parametrize("name", ["mujoco", "rapier", "dart", "drake"])
+def test_engine_has_what_was_given(name):
     """Another value of each setting, in force as read from the model."""
-    for name, setting in SETTINGS.items():
-        value = next((word for word in setting.values[::-1] if word != spelled(setting.default)), None)
-        value = value or spelled(np.add(setting.default, 1).tolist())
-        needs = "".join(f",{option}={needed}" for option, needed in setting.needs)
-        with engine(f"mujoco[{name}={value}{needs}]").prepare(falling(), 1e-3) as simulation:
-            assert spelled(simulation.settings.get(name, setting.default)) == value, name
+    verify_settings_are_in_force(name, load("slide-box"))
 
 
 def test_pybullets_defaults_are_those_of_the_library():

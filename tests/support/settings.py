@@ -1,0 +1,34 @@
+"""Each setting of an engine given with another value than its default, and read back."""
+
+import math
+
+import numpy as np
+
+from dropspin.comparisons.engines.options import Setting, spelled
+from dropspin.comparisons.engines.registry import engine
+from dropspin.scenarios import Scenario
+
+
+def other_value(setting: Setting) -> str:
+    """A value that is allowed, and not the default."""
+    if isinstance(setting.default, bool):
+        return spelled(not setting.default)
+    if setting.values:
+        return next(word for word in setting.values[::-1] if word != setting.default)
+    return "7" if setting.default == math.inf else spelled(np.minimum(np.add(setting.default, 1), setting.most).tolist())
+
+
+def verify_settings_are_in_force(name: str, scene: Scenario) -> None:
+    """An engine has each setting that is given: in single precision, what is read back is rounded."""
+    settings = engine(name).settings
+    assert settings
+    for option, setting in settings.items():
+        value = other_value(setting)
+        needs = "".join(f",{other}={needed}" for other, needed in setting.needs)
+        with engine(f"{name}[{option}={value}{needs}]").prepare(scene, 1e-3) as simulation:
+            simulation.advance(1)
+            has = simulation.settings.get(option, setting.default)
+        if isinstance(has, str | bool):
+            assert spelled(has) == value, option
+        else:
+            np.testing.assert_allclose(has, [float(part) for part in value.split()], rtol=1e-6, err_msg=option)

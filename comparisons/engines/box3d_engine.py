@@ -7,36 +7,54 @@ from robox3d._ffi import ffi, lib
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Engine, Simulation
+from dropspin.comparisons.engines.options import Setting, calibrated_values
 from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.rapier_scenes import GRIPPING, damping_of, refusal, surface_of, why_damping
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.state import PARTS
 
-SUBSTEPS = 4
 WORLD = {
-    "restitutionThreshold": (0.0, "m/s, 1 by default"),
-    "maximumLinearSpeed": (1e15, "m/s, 400 by default"),
+    "restitutionThreshold": Setting(1.0, "impact speed below which a body does not rebound", 0.0, "m/s, 1 by default", "m/s"),
+    "contactHertz": Setting(30.0, "frequency of contacts", unit="Hz"),
+    "contactDampingRatio": Setting(10.0, "damping ratio of contacts"),
+    "contactSpeed": Setting(3.0, "largest speed that corrects depth", unit="m/s"),
+    "maximumLinearSpeed": Setting(400.0, "largest speed", 1e15, "m/s, 400 by default", "m/s"),
+    "enableContinuous": Setting(True, "contacts between steps are found"),
 }
 BODY = {
-    "enableSleep": (False, "never falls asleep; by default below 0.05 m/s"),
-    "allowFastRotation": (True, "no limit of the spin"),
-    "enableContactRecycling": (False, "contacts are found anew in each step; else a rocking block errs by 3.9 cm, not 8 mm"),
+    "enableSleep": Setting(True, "the body may fall asleep", False, "never falls asleep; by default below 0.05 m/s"),
+    "sleepThreshold": Setting(0.05, "speed below which the body falls asleep", unit="m/s", needs=(("enableSleep", "true"),)),
+    "allowFastRotation": Setting(False, "no limit of the spin", True, "no limit of the spin"),
+    "enableContactRecycling": Setting(
+        True,
+        "contacts are kept while a body hardly moves",
+        False,
+        "contacts are found anew in each step; else a rocking block errs by 3.9 cm, not 8 mm",
+    ),
+    "linearDamping": Setting(
+        0.0, "damping", why=f"{why_damping('Box3D')}, with the substep for dt; angularDamping is the same", unit="1/s", is_computed=True
+    ),
+    "angularDamping": Setting(0.0, "damping of rotation", unit="1/s", is_computed=True),
 }
-REASONS = {name: why for name, (_, why) in (WORLD | BODY).items()} | {
-    "substeps": "Box3D's examples take as many",
-    "linearDamping": f"{why_damping('Box3D')}, with the substep for dt; angularDamping is the same",
-    "friction": f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution",
+SURFACE = {
+    "restitution": Setting(0.0, "of body and floor", is_computed=True),
+    "friction": Setting(
+        0.6, "of body and floor", why=f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution", is_computed=True
+    ),
+    "rollingResistance": Setting(0.0, "of body and floor, over the radius"),
 }
+STEP = {"substeps": Setting(4, "substeps of a step", why="Box3D's examples take as many", least=1)}
 
 
 class Box3D(Engine):
     """A rigid body of Box3D on a box."""
 
-    name, order, precision, reasons = "box3d", 1.0, np.float32, REASONS
+    name, order, precision = "box3d", 1.0, np.float32
     shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"profile": mapping.PROFILES, "beside": mapping.BESIDE}
     representations: ClassVar = ("beside",)
+    settings: ClassVar = STEP | WORLD | BODY | SURFACE
 
     def declines(self, scene: Scenario) -> str | None:
         return refusal(scene, "box", "Box3D")
@@ -49,13 +67,18 @@ class Box3DSimulation(Simulation):
     """A world of Box3D."""
 
     def __init__(self, scene: Scenario, dt: float, engine: Box3D) -> None:
-        self._dt, self.velocity_lag = dt, 0.5 * dt / SUBSTEPS
-        world, self._made, self._surface = lib.b3DefaultWorldDef(), lib.b3DefaultBodyDef(), surface_of(scene)
-        chosen = [{} if engine.is_default else {name: value for name, (value, _) in made.items()} for made in (WORLD, BODY)]
-        chosen[1] |= {f"{motion}Damping": rate for motion, rate in damping_of(scene, dt / SUBSTEPS).items()}
-        for made, values in zip((world, self._made), chosen, strict=True):
-            for name, value in values.items():
-                setattr(made, name, value)
+        self._dt, self._substeps = dt, engine.given.get("substeps", STEP["substeps"].default)
+        self.velocity_lag = 0.5 * dt / self._substeps
+        world, self._made, surface = lib.b3DefaultWorldDef(), lib.b3DefaultBodyDef(), lib.b3DefaultShapeDef()
+        chosen = {f"{motion}Damping": rate for motion, rate in damping_of(scene, dt / self._substeps).items()} | surface_of(scene)
+        chosen |= ({} if engine.is_default else calibrated_values(engine.settings)) | engine.given
+        in_force: dict[str, Any] = {"substeps": self._substeps}
+        for made, settings in ((world, WORLD), (self._made, BODY), (surface.baseMaterial, SURFACE)):
+            for name in settings.keys() & chosen.keys():
+                setattr(made, name, chosen[name])
+            found = {name: getattr(made, name) for name in settings}
+            in_force |= {name: value if isinstance(value, bool) else float(str(np.float32(value))) for name, value in found.items()}
+        self._surface = surface
         world.gravity = tuple(scene.acceleration)
         self._world, half = lib.b3CreateWorld(ffi.addressof(world)), mapping.FLOOR_HALF_SIZE
         if scene.floor:
@@ -65,13 +88,11 @@ class Box3DSimulation(Simulation):
         self._body, *_ = [self._add(one) for one in mapping.bodies_in(scene, engine.option("beside"))]
         options = {name: engine.option(name) for name in engine.choices}
         library = ".".join(str(getattr(lib.b3GetVersion(), part)) for part in ("major", "minor", "revision"))
-        given = {"version": version("robox3d"), "library": library, **options, "substeps": SUBSTEPS}
-        self.settings = given | chosen[0] | chosen[1] | self._surface
+        self.settings = {"version": version("robox3d"), "library": library, **options, **in_force}
 
     def _add_shape(self, body: Any, size: float | tuple[float, ...]) -> None:
         """Add a ball of a radius, or a box of half extents."""
-        made = lib.b3DefaultShapeDef()
-        made.baseMaterial.friction, made.baseMaterial.restitution = self._surface["friction"], self._surface["restitution"]
+        made = self._surface
         if isinstance(size, tuple):
             hull = lib.b3MakeBoxHull(*size)
             lib.b3CreateHullShape(body, ffi.addressof(made), ffi.addressof(hull, "base"))
@@ -91,7 +112,7 @@ class Box3DSimulation(Simulation):
 
     def advance(self, steps: int) -> None:
         for _ in range(steps):
-            lib.b3World_Step(self._world, self._dt, SUBSTEPS)
+            lib.b3World_Step(self._world, self._dt, self._substeps)
 
     def state(self) -> Array:
         x, q = lib.b3Body_GetPosition(self._body), lib.b3Body_GetRotation(self._body)

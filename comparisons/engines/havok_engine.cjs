@@ -17,12 +17,14 @@ function done(result) {
   return value;
 }
 
-function open({ dt, gravity, floor, bodies, settings: { unit, idealStepTime, speedLimit, alwaysActive, restitution, friction, ...damping } }) {
+function open({ dt, gravity, floor, bodies, settings: { world: chosen, body: made, surface } }) {
+  const { unit, idealStepTime, linearSpeedLimit = 200, angularSpeedLimit = 100 } = chosen;
+  const { restitution, friction } = surface;
   const world = done(H.HP_World_Create());
   const scaled = (numbers) => numbers.map((one) => one / unit);
   done(H.HP_World_SetGravity(world, scaled(gravity)));
   if (idealStepTime) done(H.HP_World_SetIdealStepTime(world, idealStepTime));
-  if (speedLimit) done(H.HP_World_SetSpeedLimit(world, speedLimit, speedLimit));
+  done(H.HP_World_SetSpeedLimit(world, linearSpeedLimit, angularSpeedLimit));
   const add = (shape, kind) => {
     const body = done(H.HP_Body_Create());
     if (floor) {
@@ -43,9 +45,9 @@ function open({ dt, gravity, floor, bodies, settings: { unit, idealStepTime, spe
     const moments = one.moments.map((moment) => moment / one.mass / unit ** 2);
     done(H.HP_Body_SetMassProperties(added, [[0, 0, 0], one.mass, moments, one.axes]));
     done(H.HP_Body_SetQTransform(added, [scaled(one.position), one.orientation]));
-    if (damping.linearDamping !== undefined) done(H.HP_Body_SetLinearDamping(added, damping.linearDamping));
-    if (damping.angularDamping !== undefined) done(H.HP_Body_SetAngularDamping(added, damping.angularDamping));
-    if (alwaysActive) done(H.HP_Body_SetActivationControl(added, H.ActivationControl.ALWAYS_ACTIVE));
+    if (made.linearDamping !== undefined) done(H.HP_Body_SetLinearDamping(added, made.linearDamping));
+    if (made.angularDamping !== undefined) done(H.HP_Body_SetAngularDamping(added, made.angularDamping));
+    if (made.alwaysActive) done(H.HP_Body_SetActivationControl(added, H.ActivationControl.ALWAYS_ACTIVE));
     done(H.HP_World_AddBody(world, added, false));
     done(H.HP_Body_SetLinearVelocity(added, scaled(one.velocity))); // outside of a world it is limited to 200
     done(H.HP_Body_SetAngularVelocity(added, one.angular_velocity));
@@ -61,7 +63,7 @@ function open({ dt, gravity, floor, bodies, settings: { unit, idealStepTime, spe
       return [...metres(position), ...orientation, ...metres(velocity), ...spin];
     },
     close: () => done(H.HP_World_Release(world)),
-    settings: { unit, idealStepTime, speedLimit, alwaysActive, restitution, friction, ...damping },
+    settings: { ...chosen, ...made, ...surface },
     substeps: Math.min(8, Math.max(1, Math.ceil((4 * dt) / (idealStepTime ?? 1 / 60)))),
     built: { mass, moments: moments.map((one) => one * mass * unit ** 2), axes, gravity },
   };

@@ -16,6 +16,7 @@ from dropspin.comparisons.engines.node_process import node
 from dropspin.comparisons.engines.options import Setting
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
+from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.state import PARTS
 
 NUMBERS = count()
@@ -61,6 +62,8 @@ class NodeSimulation(Simulation):
         self._built, self.velocity_lag = answer.get("built"), 0.5 * dt / answer["substeps"]
         self._state = self._ask(0)[0]
         self.settings = {"version": self._node.version, **options, **answer["settings"]}
+        if unknown := engine.given.keys() - self.settings.keys():
+            raise DropspinError(f"{engine.name} {self._node.version} has no {', '.join(sorted(unknown))}.")
 
     def _ask(self, steps: int, every: int = 1) -> Array:
         """States now and after each `every` of some steps."""

@@ -17,7 +17,7 @@ function floorOf({ kind, halfSize }) {
   return R.ColliderDesc.trimesh(new Float32Array(corners), new Uint32Array([0, 1, 2, 2, 1, 3]));
 }
 
-function open({ gravity, floor, bodies, settings: { parameters, ...made } }) {
+function open({ gravity, floor, bodies, settings: { parameters, body: made, surface: material } }) {
   const world = new R.World(vector(gravity));
   const inForce = {};
   for (const [name, value] of Object.entries(parameters)) {
@@ -25,7 +25,7 @@ function open({ gravity, floor, bodies, settings: { parameters, ...made } }) {
     world.integrationParameters[name] = value;
     inForce[name] = world.integrationParameters[name] ?? value; // some cannot be read
   }
-  const surface = (shape) => shape.setDensity(0).setRestitution(made.restitution).setFriction(made.friction);
+  const surface = (shape) => shape.setDensity(0).setRestitution(material.restitution).setFriction(material.friction);
   const [body] = bodies.map((one) => {
     const moving = R.RigidBodyDesc.dynamic()
       .setTranslation(...one.position)
@@ -34,7 +34,7 @@ function open({ gravity, floor, bodies, settings: { parameters, ...made } }) {
       .setAngvel(vector(one.angular_velocity))
       .setLinearDamping(made.linearDamping ?? 0)
       .setAngularDamping(made.angularDamping ?? 0)
-      .setCanSleep(made.canSleep)
+      .setCanSleep(made.canSleep ?? true)
       .setAdditionalMassProperties(one.mass, vector([0, 0, 0]), vector(one.moments), quaternion(one.axes));
     const added = world.createRigidBody(moving);
     if (floor) world.createCollider(surface(one.radius ? R.ColliderDesc.ball(one.radius) : R.ColliderDesc.cuboid(...one.halfExtents)), added);
@@ -48,7 +48,7 @@ function open({ gravity, floor, bodies, settings: { parameters, ...made } }) {
     state: () => [body.translation(), body.rotation(), body.linvel(), body.angvel()].flatMap(listed),
     broken: () => (body.isEnabled?.() ?? true ? undefined : "Rapier disabled the body: its state is not finite"),
     close: () => world.free(),
-    settings: { ...inForce, ...made },
+    settings: { ...inForce, ...made, ...material },
     substeps: world.integrationParameters.numSolverIterations,
     built: moments && { mass, moments: listed(moments), axes: listed(axes), gravity: listed(world.gravity) },
   };

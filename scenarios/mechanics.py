@@ -35,8 +35,7 @@ def angular_momentum_of(inertia: Components, orientation: Components, spin: Comp
 def kinetic_energy(scene: Scenario, motion: Trajectory) -> Array:
     """M v²/2 + ω·L/2 [J], shape (n,)."""
     orientation, velocity, spin = map(_components, (motion.orientation, motion.velocity, motion.angular_velocity))
-    values: Array = kinetic_energy_of(scene.body.mass, _tensor(scene), orientation, velocity, spin)
-    return values
+    return kinetic_energy_of(scene.body.mass, _tensor(scene), orientation, velocity, spin)
 
 
 def kinetic_energy_of(mass: float, inertia: Components, orientation: Components, velocity: Components, spin: Components) -> Any:
@@ -55,8 +54,7 @@ def energy(scene: Scenario, motion: Trajectory, synchronised: bool = True, kinet
     position, velocity, origin, gravity = map(_components, (motion.position, motion.velocity, energy_origin(scene), scene.acceleration))
     lag = motion.velocity_lag if synchronised else 0.0
     kinetic = kinetic_energy(scene, motion) if kinetic is None else kinetic
-    values: Array = energy_of(kinetic, scene.body.mass, position, velocity, origin, gravity, lag)
-    return values
+    return energy_of(kinetic, scene.body.mass, position, velocity, origin, gravity, lag)
 
 
 def energy_of(

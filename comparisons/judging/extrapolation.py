@@ -146,8 +146,7 @@ class Posterior:
     def _below(self, x: Array) -> Array:
         """The probability that m is not 0 and at most x, at each x."""
         points = np.where(self.squares, np.abs(x[:, None]) * x[:, None], x[:, None])
-        share: Array = student_t(self.freedom, (points - self.centres) / self.widths) @ self.weights
-        return share
+        return student_t(self.freedom, (points - self.centres) / self.widths) @ self.weights
 
 
 def extrapolate(

@@ -244,8 +244,7 @@ class Comparison:
 
     def contact_point(self, row: int) -> Array:
         """The vector from the centre of mass to the lowest point at a row [m], shape (3,); the mean if several points are equally low."""
-        point: Array = self.scene.body.lowest(self.motion.orientation[row], 1e-6).mean(axis=0)
-        return point
+        return self.scene.body.lowest(self.motion.orientation[row], 1e-6).mean(axis=0)
 
     def normal_velocity_of_contact(self, row: int, contact_row: int) -> float:
         """Vertical velocity [m/s] at one row of the point that is lowest at another row."""

@@ -26,8 +26,7 @@ def angular_momentum_difference(case: Comparison, rows: Rows = ALL) -> Array:
     computed, exact, scale = case.angular_momentum, case.exact_states.angular_momentum, case.exact_states.largest_angular_momentum
     if scale == 0.0:
         raise Unresolved("the angular momentum is 0 in double precision")
-    difference: Array = (computed[rows] - exact[rows]) / scale
-    return difference
+    return (computed[rows] - exact[rows]) / scale
 
 
 def angular_momentum_direction_error(case: Comparison) -> Array:

@@ -101,8 +101,7 @@ class States:
         before, after = (tuple(self.motion.velocity[rows].T) for rows in (slice(None, -1), slice(1, None)))
         strength = float(np.sqrt(scalar_product(gravity, gravity)))
         damping_share = 0.0 if damping is None else max(dt, self.scene.factor_dt) * damping.linear
-        mask: Mask = is_touching(before, after, dt, gravity, strength, damping_share)
-        return mask
+        return is_touching(before, after, dt, gravity, strength, damping_share)
 
 
 def is_touching(before: Components, after: Components, dt: float, gravity: Components, strength: float, damping_share: float) -> Any:

@@ -40,8 +40,7 @@ OF_TWO_DRAWS = math.sqrt(2.0)
 
 def rounding(scene: Scenario, unit: str, precision: type, steps: Array) -> Array:
     """The largest error that rounding and the residuals of solvers may cause in a number of steps, in the unit of the metric."""
-    rounded: Array = scale(scene, unit) * (NEGLIGIBLE + EPS_PER_STEP * float(np.finfo(precision).eps) * steps)
-    return rounded
+    return scale(scene, unit) * (NEGLIGIBLE + EPS_PER_STEP * float(np.finfo(precision).eps) * steps)
 
 
 def negligible(scene: Scenario, unit: str) -> float:

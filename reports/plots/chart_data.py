@@ -59,8 +59,7 @@ def _at_the_same(x: Array, reference: Array) -> Array:
     """For each position, whether it and all previous ones equal those of the reference, shape (n,)."""
     count = min(len(x), len(reference))
     same = np.isclose(x[:count], reference[:count], rtol=1e-12, atol=0.0)
-    so_far: Array = np.logical_and.accumulate(same).astype(float)
-    return so_far
+    return np.logical_and.accumulate(same).astype(float)
 
 
 def _positions(x: Array) -> Any:

@@ -99,8 +99,7 @@ def principal_spin(scene: Scenario, motion: Trajectory) -> Array:
 def energy_ellipsoid(scene: Scenario) -> Array:
     """Half axes √(2 T / I) of the ellipsoid of angular velocities that have the initial rotational energy T [rad/s], shape (3,)."""
     moments, _ = _principal(scene)
-    half_axes: Array = np.sqrt(moments @ _start(scene) ** 2 / moments)
-    return half_axes
+    return np.sqrt(moments @ _start(scene) ** 2 / moments)
 
 
 def wobbles_freely(scene: Scenario) -> bool:

@@ -67,8 +67,7 @@ def around_axis(radii: Array, heights: Array, meridians: int = MERIDIANS) -> Arr
     """Points of a surface of revolution about the y axis, shape (n, 3): rings of given radii at given heights [m]."""
     angles = np.linspace(0.0, 2.0 * np.pi, meridians, endpoint=False)
     rings = np.multiply.outer(radii, np.stack([np.sin(angles), np.zeros(meridians), np.cos(angles)], axis=-1))
-    points: Array = (rings + np.multiply.outer(heights, UP)[:, np.newaxis]).reshape(-1, 3)
-    return points
+    return (rings + np.multiply.outer(heights, UP)[:, np.newaxis]).reshape(-1, 3)
 
 
 def _around(points: Array, corners: list[int], normal: Array) -> list[int]:

@@ -158,8 +158,7 @@ class Shape(Table):
 
         Source: R. Bhatia & C. Davis, A better bound on the variance, Amer. Math. Monthly 107 (2000).
         """
-        squares: Array = (self.semi_axes + self.vertices.max(axis=0)) * (self.semi_axes - self.vertices.min(axis=0))
-        return squares
+        return (self.semi_axes + self.vertices.max(axis=0)) * (self.semi_axes - self.vertices.min(axis=0))
 
     def possible_multiple(self, squares: Array, enough: float = math.inf) -> float:
         """The largest multiple of second moments about the centre of mass [m²], shape (3, 3), that masses inside of the body have.

@@ -16,8 +16,7 @@ RIM = np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0], [-1.0, 1.0, 0.0], [0.0, 1.0, -
 def depth_below_centre(orientation: Array, semi_axes: Array) -> Array:
     """Depth of the lowest point of ellipsoids below their centres [m], shape (...), from shapes (..., 4) and (..., 3)."""
     stretched = np.linalg.norm(semi_axes * unrotate(orientation, np.broadcast_to(UP, (*orientation.shape[:-1], 3))), axis=-1)
-    depth: Array = np.where(np.ptp(semi_axes, axis=-1) == 0.0, semi_axes[..., 0], stretched)
-    return depth
+    return np.where(np.ptp(semi_axes, axis=-1) == 0.0, semi_axes[..., 0], stretched)
 
 
 def rise_of_centre(orientation: Array, semi_axes: Array) -> Array:

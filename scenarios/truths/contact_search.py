@@ -109,8 +109,7 @@ class ContactSearch:
             spin = self.flight.start[SPIN]
             moving = cross(np.broadcast_to(spin, self.points.shape), rotate(self.flight.start[ORIENTATION], self.points))
             about = 0.0 if self._is_ball else np.linalg.norm(spin) * self.semi_axes.max()
-            bound: Array = math.hypot(spin[0], spin[2]) * (np.linalg.norm(moving, axis=1) + about)
-            return bound
+            return math.hypot(spin[0], spin[2]) * (np.linalg.norm(moving, axis=1) + about)
         return (1.0 + ANGULAR_ACCELERATION) * rotor.largest_spin**2 * self._arms
 
     def _within_reach(self, duration: float) -> list[tuple[float, float]]:
@@ -196,8 +195,7 @@ class ContactSearch:
     @cached_property
     def _starts_on_floor(self) -> NDArray[np.bool_]:
         """Whether each corner is on the floor at the start, shape (n,)."""
-        on_floor: NDArray[np.bool_] = self._corners(np.zeros(1))[0][0] <= TOUCHING * self._size
-        return on_floor
+        return self._corners(np.zeros(1))[0][0] <= TOUCHING * self._size
 
     def _corners_at(self, now: float) -> tuple[Array, Array, Array]:
         """Heights above the floor [m], upward velocities [m/s] and rounding errors of the heights [m] at a time [s], each of shape (n,)."""

@@ -234,8 +234,7 @@ def _leave(points: Array, state: Array) -> bool:
 
 def _rising(points: Array, state: Array) -> Array:
     """Upward velocity [m/s] of points of the body, shape (n,)."""
-    upward: Array = state[8] + np.cross(state[SPIN], points)[:, 1]
-    return upward
+    return state[8] + np.cross(state[SPIN], points)[:, 1]
 
 
 def _no_speed(scene: Scenario, state: Array) -> float:

@@ -95,8 +95,7 @@ def _decayed(rate: float, turned: Array) -> Array:
     """D(k) = (1 - exp(-k λ))/k, which is λ for k = 0."""
     if rate == 0.0:
         return turned
-    decayed: Array = -np.expm1(-rate * turned) / rate
-    return decayed
+    return -np.expm1(-rate * turned) / rate
 
 
 def _inverse(time: Callable[[Array], Array], pace: Callable[[Array], Array], t: Array) -> Array:

@@ -217,8 +217,7 @@ def _along(axes: Array, orientation: Array, angular_velocity: Array) -> Exact:
     along, across = np.array([x, y, z]), np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     squares = w * w + along @ along
     spin = ((w * w - along @ along) * vector + 2 * (along @ vector) * along - 2 * w * (across @ vector)) / squares
-    turned: Exact = np.array([[Fraction(component) for component in axis] for axis in axes.T.tolist()]) @ spin
-    return turned
+    return np.array([[Fraction(component) for component in axis] for axis in axes.T.tolist()]) @ spin
 
 
 def _circled_axis_last(moments: Array, spin: Exact) -> Array:

@@ -72,8 +72,7 @@ def response_of(point: Array, mass: float, inverse: Array) -> Array:
         inverse: The inverse inertia in the world frame [1/(kg m²)], shape (3, 3).
     """
     arm = np.cross(np.eye(3), point)  # as a matrix: arm @ j = point × j
-    response: Array = np.eye(3) / mass - arm @ inverse @ arm
-    return response
+    return np.eye(3) / mass - arm @ inverse @ arm
 
 
 def _impulse(law: Law, response: Array, u: Array, e: float, friction: str | float) -> Array | None:

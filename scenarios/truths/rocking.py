@@ -130,8 +130,7 @@ def _pivots(scene: Scenario, stand: Stand) -> bool:
 def _rate(stand: Stand, edge: NDArray[np.intp] | int) -> Array:
     """The parameter p of the pendulum about an edge [1/s]."""
     at = edge % len(stand.radii)
-    rate: Array = np.sqrt(stand.gravity / ((1.0 + stand.shares[at]) * stand.radii[at]))
-    return rate
+    return np.sqrt(stand.gravity / ((1.0 + stand.shares[at]) * stand.radii[at]))
 
 
 def _ratio(stand: Stand, old: int, new: int) -> float:

@@ -69,8 +69,7 @@ def rolling(scene: Scenario, floor: Floor) -> Truth | None:
     lever = (share - 1.0) / radius
 
     def spun(free: Array, change: Array) -> Array:
-        spins: Array = free + lever * np.cross(UP, change)
-        return spins
+        return free + lever * np.cross(UP, change)
 
     def spins(t: Array) -> tuple[Array, Array]:
         change, way = lost(t)

@@ -32,8 +32,7 @@ def spin_rounding(orientation: Array, angular_velocity: Array) -> Array:
     """The change of ω along the body axes by one eps of the initial state [rad/s], shape (3,); 0 where all terms are 0."""
     x, y, z, w = np.abs(orientation)
     off = 2.0 * np.array([[0.0, x * y + z * w, x * z + y * w], [x * y + z * w, 0.0, y * z + x * w], [x * z + y * w, y * z + x * w, 0.0]])
-    rounding: Array = EPS * (np.eye(3) + off) @ np.abs(angular_velocity)
-    return rounding
+    return EPS * (np.eye(3) + off) @ np.abs(angular_velocity)
 
 
 def horizon(moments: tuple[float, ...], spin: tuple[Fraction, ...], rounding: Array) -> float:

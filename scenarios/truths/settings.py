@@ -100,8 +100,7 @@ def spin_about_axis(
     """
     resisting = inertia + armature
     rate = linear / resisting * np.asarray(t, dtype=float)
-    slowed: Array = spin * np.exp(-rate) / (1.0 + quadratic * abs(spin) / resisting * np.asarray(t) * phi1(rate))
-    return slowed
+    return spin * np.exp(-rate) / (1.0 + quadratic * abs(spin) / resisting * np.asarray(t) * phi1(rate))
 
 
 def time_constant(spin: float, inertia: float, armature: float = 0.0, linear: float = 0.0, quadratic: float = 0.0) -> float:

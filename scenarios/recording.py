@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from dropspin.scenarios.errors import DropspinError, SceneError, did_you_mean
 from dropspin.scenarios.files import read_file
 from dropspin.scenarios.rotations import length
 from dropspin.scenarios.state import ORIENTATION, PARTS, Array
-from dropspin.scenarios.tables import LARGEST, Positive, Table
+from dropspin.scenarios.tables import AS_LISTS, Positive, Table, rows
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import shown, validated
 
@@ -28,26 +28,6 @@ STARTS = 20
 NEAR_UNIT = 1e-3
 """Largest difference from 1 of the length of a quaternion: they are written with six digits."""
 LARGEST_FILE = 200_000_000  # bytes
-
-
-def _rows(*width: int) -> BeforeValidator:
-    """Rows of finite numbers, or numbers alone, as an array that does not change."""
-
-    def array(raw: Any) -> Any:
-        try:
-            values: Array = np.array(raw, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            values = np.empty(0)
-        if values.ndim != 1 + len(width) or values.shape[1:] != width or not len(values) or not (np.abs(values) <= LARGEST).all():
-            rows = "".join(f"rows of {numbers} " for numbers in width)
-            raise ValueError(f"must be a list of {rows}numbers of up to {LARGEST:g}")
-        values.setflags(write=False)
-        return values
-
-    return BeforeValidator(array)
-
-
-_AS_LISTS = PlainSerializer(lambda array: array.tolist())
 
 
 class Toss(Table):
@@ -64,10 +44,10 @@ class Toss(Table):
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
     name: Text
-    t: Annotated[Array, _rows(), _AS_LISTS]
-    position: Annotated[Array, _rows(3), _AS_LISTS]
-    orientation: Annotated[Array, _rows(4), _AS_LISTS]
-    starts: Annotated[Array, _rows(13), _AS_LISTS]
+    t: Annotated[Array, rows("numbers"), AS_LISTS]
+    position: Annotated[Array, rows("rows of 3 numbers", 3), AS_LISTS]
+    orientation: Annotated[Array, rows("rows of 4 numbers", 4), AS_LISTS]
+    starts: Annotated[Array, rows("rows of 13 numbers", 13), AS_LISTS]
 
     @model_validator(mode="after")
     def _is_a_motion(self) -> Self:

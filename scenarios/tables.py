@@ -1,9 +1,12 @@
 """Types of the numbers and the tables of a scene's file."""
 
 import math
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
+
+from dropspin.scenarios.state import Array
 
 LARGEST = 1e50
 """Largest magnitude of a number of a scene: energies and inertias, products of up to five of them, stay finite."""
@@ -13,6 +16,26 @@ Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Vector = Annotated[tuple[Number, ...], Field(min_length=3, max_length=3)]
 PositiveVector = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
+
+
+AS_LISTS = PlainSerializer(lambda array: array.tolist())
+"""How a field that is an array is written."""
+
+
+def rows(content: str, *width: int, kind: type = float) -> BeforeValidator:
+    """Rows of finite numbers, or numbers alone, as an array that does not change; `content` says in messages what the list has."""
+
+    def array(raw: Any) -> Any:
+        try:
+            values: Array = np.array(raw, dtype=kind)
+        except (TypeError, ValueError, OverflowError):
+            values = np.empty(0)
+        if values.ndim != 1 + len(width) or values.shape[1:] != width or not len(values) or not (np.abs(values) <= LARGEST).all():
+            raise ValueError(f"must be a list of {content} of up to {LARGEST:g}")
+        values.setflags(write=False)
+        return values
+
+    return BeforeValidator(array)
 
 
 class Table(BaseModel):

@@ -6,6 +6,7 @@ from typing import Literal, NamedTuple
 from zlib import crc32
 
 from dropspin.comparisons.engines.options import parts_of
+from dropspin.comparisons.engines.registry import BUILT_IN
 
 Dashes = Literal["", "dashed", "dotted", "dashdot", "long"]
 
@@ -18,25 +19,9 @@ STYLES = [(colour, marker) for marker in MARKERS for colour in COLOURS]
 REPEATED: tuple[Dashes, ...] = ("", "dashdot", "long")
 """The dash patterns of the first, second and third engine of a colour; those of exact solutions, fits and guides are others."""
 
-NAMES = {
-    "wang": "Wang's method",
-    "mujoco": "MuJoCo",
-    "pybullet": "PyBullet",
-    "rapier": "Rapier",
-    "rapier-js": "Rapier (JavaScript)",
-    "jolt": "Jolt",
-    "havok": "Havok",
-    "dart": "DART",
-    "drake": "Drake",
-    "box3d": "Box3D",
-    "ode": "ODE",
-    "sapien": "SAPIEN",
-    "exudyn": "Exudyn",
-    "jsbsim": "JSBSim",
-    "mjx": "MJX",
-    "mujoco-warp": "MuJoCo Warp",
-    "newton": "Newton",
-    "genesis": "Genesis",
+NAMES = {name: home.adapter for name, home in BUILT_IN.items()} | {
+    **{"wang": "Wang's method", "rapier-js": "Rapier (JavaScript)", "cannon-es": "cannon-es"},
+    **{"dart": "DART", "sapien": "SAPIEN", "mujoco-warp": "MuJoCo Warp"},
 }
 """The names of engines as their authors write them; an engine that is not listed keeps the name by which commands take it."""
 OPTIONS = {"integrator=rk4": "RK4", "rotation=rk4": "RK4", "integrator=euler": "Euler", "profile=default": "default settings"}

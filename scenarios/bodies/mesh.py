@@ -4,36 +4,17 @@ from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from dropspin.scenarios.bodies.hull import FLAT, Outline, hull_corners, lowest_face, outline
 from dropspin.scenarios.bodies.inertia import Moments, second_moments
 from dropspin.scenarios.bodies.mesh_files import Faces
 from dropspin.scenarios.bodies.shape import Shape
 from dropspin.scenarios.state import Array
-from dropspin.scenarios.tables import LARGEST, Vector
+from dropspin.scenarios.tables import AS_LISTS, Vector, rows
 
 ROUNDING = 1e-15  # of products of inertia, relative to the moments
 MOST_DRAWN = 2000  # faces; the hull of a finer mesh is drawn
-
-
-def _rows(kind: type) -> BeforeValidator:
-    """Rows of three numbers as an array that does not change."""
-
-    def array(raw: Any) -> Any:
-        try:
-            values: Array = np.array(raw, dtype=kind)
-        except (TypeError, ValueError, OverflowError):
-            values = np.empty(0)
-        if values.ndim != 2 or values.shape[1] != 3 or not len(values) or not (np.abs(values) <= LARGEST).all():
-            raise ValueError(f"must be a list of rows of three numbers of up to {LARGEST:g}")
-        values.setflags(write=False)
-        return values
-
-    return BeforeValidator(array)
-
-
-_AS_LISTS = PlainSerializer(lambda array: array.tolist())
 
 
 def is_closed(points: Array, faces: Faces) -> bool:
@@ -53,8 +34,8 @@ class Mesh(Shape):
 
     shape: Literal["mesh"]
     center_of_mass: Vector | None = None  # by default that of the distribution that `inertia` names, of a solid if it is numbers
-    points: Annotated[Array, _rows(float), _AS_LISTS, Field(repr=False)]
-    faces: Annotated[Faces, _rows(np.int64), _AS_LISTS, Field(repr=False)]
+    points: Annotated[Array, rows("rows of three numbers", 3), AS_LISTS, Field(repr=False)]
+    faces: Annotated[Faces, rows("rows of three numbers", 3, kind=np.int64), AS_LISTS, Field(repr=False)]
     inertia: Literal["solid", "surface", "vertices", "note"] | Moments = "solid"
 
     @model_validator(mode="after")

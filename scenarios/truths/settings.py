@@ -190,7 +190,7 @@ def free_motion(
 
     def rates(_: float, state: Array) -> Array:
         velocity, spin = state[VELOCITY], state[SPIN]
-        to_world, turning = _matrix(*state[ORIENTATION].tolist()), crossing(spin)
+        to_world, turning = rotate(state[ORIENTATION], np.eye(3)).T, crossing(spin)
         circling = turning @ c
         force, torque = resistance(velocity - to_world @ circling, spin)
         force = force @ to_world + armature * (turning @ circling)
@@ -206,17 +206,6 @@ def free_motion(
     states[:, ORIENTATION] /= np.linalg.norm(states[:, ORIENTATION], axis=1, keepdims=True)
     states[:, SPIN] = rotate(states[:, ORIENTATION], states[:, SPIN])
     return states
-
-
-def _matrix(x: float, y: float, z: float, w: float) -> Array:
-    """The rotation matrix of a quaternion, shape (3, 3)."""
-    return np.array(
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-        ]
-    )
 
 
 def _over(function: Callable[[Array], Array], x: Array) -> Array:

@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -143,10 +143,10 @@ def compile_cached(function: Callable[..., Any], *other_sources: Path) -> Callab
         other_sources: The files outside this package that it consists of.
     """
     with _cache_folder(other_sources) as writable:
-        return njit(nogil=True, error_model="numpy", cache=writable)(function)
+        return partial(_called, njit(nogil=True, error_model="numpy", cache=writable)(function))
 
 
-def called(kernel: Callable[..., Any], *arguments: Any) -> Any:
+def _called(kernel: Callable[..., Any], *arguments: Any) -> Any:
     """What a kernel returns; one for which the disk has no room, which numba reports after it compiled it, works without the cache."""
     try:
         return kernel(*arguments)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dropspin.reference_impl.body import Array, Body, World
 from dropspin.reference_impl.floor_plane import BLOCK
-from dropspin.reference_impl.kernels import Parts, called, recording_kernel
+from dropspin.reference_impl.kernels import Parts, recording_kernel
 from dropspin.reference_impl.methods import Methods
 from dropspin.reference_impl.parameters import SEMI_AXES, checked, ensemble_size, frictions, is_finite, pack
 from dropspin.reference_impl.state import ORIENTATION, SPIN
@@ -140,7 +140,7 @@ class Simulator:
         parts = Parts(*modelled, *self._surface, edges, len(world.walls), self._many_points is not None)
         recorded = np.empty((size, 1 + steps // every, 13))
         kernel = recording_kernel(self._methods, parts)
-        fill = partial(called, kernel, recorded, starts, columns, points, self._many_points, on_vertices, every)
+        fill = partial(kernel, recorded, starts, columns, points, self._many_points, on_vertices, every)
         self.unsolved_steps += share_out(fill, size, steps, threads)
         is_alone = not is_ensemble and np.ndim(states) == 1 and (forces is None or np.ndim(forces) == 2)
         return recorded[0] if is_alone else recorded

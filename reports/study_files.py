@@ -10,9 +10,9 @@ from pydantic import Field, TypeAdapter, ValidationError
 from dropspin.comparisons.regressions.comparing import History
 from dropspin.comparisons.results.folder import SECTION, file_name, read_stored
 from dropspin.reports.document import Charts, Document
-from dropspin.reports.html.study import study_page
 from dropspin.reports.markdown import markdown
 from dropspin.reports.output import write_table
+from dropspin.reports.pages import page
 from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.plots.figure import figure_of, save_figure
 from dropspin.reports.stories.history import document as history_document
@@ -39,7 +39,7 @@ def write_study_and_page(study: Study, folder: Path) -> Document:
 
     document = write_study(study, folder)
     pq.write_table(pa.Table.from_pylist(study.rows()), folder / f"{study.study}.parquet")
-    (folder / "report.html").write_text(study_page(document), encoding="utf-8")
+    (folder / "report.html").write_text(page("study.html", section=document), encoding="utf-8")
     return document
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -106,12 +106,11 @@ def _for_each(values: Array, size: int) -> NDArray[np.float64]:
 def _kernel() -> Callable[..., None]:
     from numba.extending import register_jitable
 
-    from dropspin.reference_impl.kernels import called, compile_cached
+    from dropspin.reference_impl.kernels import compile_cached
 
     for formula in (*mechanics.FORMULAS, is_touching):
         register_jitable(formula)
-    kernel = compile_cached(_fill, *(Path(module) for module in (__file__, mechanics.__file__, states_module.__file__)))
-    return partial(called, kernel)
+    return compile_cached(_fill, *(Path(module) for module in (__file__, mechanics.__file__, states_module.__file__)))
 
 
 def _fill(outputs: Any, states: Any, unit_tolerance: float, last_row: Any, inputs: Any) -> None:

@@ -244,9 +244,9 @@ def contact_gap(case: Comparison) -> float:
     return _largest(case.contacts.gap)
 
 
-def values_of(scene: Scenario, truth: Truth | None, motion: Trajectory, exact: Trajectory | None = None) -> dict[str, float]:
+def values_of(scene: Scenario, truth: Truth | None, motion: Trajectory) -> dict[str, float]:
     """Every metric that a scene has, of one motion, by name; NaN where the time step is too coarse."""
-    case = Comparison.with_truth(scene, motion, truth, exact)
+    case = Comparison.with_truth(scene, motion, truth)
     return {metric.name: metric.value_or_nan([case]) for metric in metrics_for(scene, truth)}
 
 

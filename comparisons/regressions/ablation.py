@@ -23,11 +23,13 @@ from dropspin.comparisons.running.start_phases import StartPhase
 from dropspin.scenarios import truth_for
 
 
-def with_explaining_settings(checked: Checked, baseline: Baseline) -> Checked:
+def with_explaining_settings(checked: Checked, baseline: Baseline | None) -> Checked:
     """A check with rows of kind `setting` for each engine of which settings changed since its results were accepted, and results fail.
 
     The engine simulates the scene of its largest change again, with the accepted values of these settings.
     """
+    if baseline is None:
+        return checked
     results = checked.results
     failing = regressed(checked.changes)
     failing = failing[failing["kind"].isin(["truth", "invariant"]) & failing["value"].notna()]

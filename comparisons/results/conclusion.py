@@ -1,11 +1,11 @@
 """What a run says about its engines: which one keeps a quantity within a tolerance, at which time steps, and in which scenes not."""
 
 import math
-import statistics
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.results.results import Results, relative_sizes
@@ -57,18 +57,10 @@ class Answer:
         return not math.isnan(self.dt) and len(self.within) >= ENOUGH and len(self.within) > len(self.beyond) + len(self.undecided)
 
 
-def _has_coulomb_friction(scene: Scenario) -> bool:
-    return any(0.0 < surface.coefficient < np.inf for surface in scene.surfaces)
-
-
-def _strikes_with_a_corner(scene: Scenario) -> bool:
-    return scene.floor is not None and scene.body.shape != "sphere" and scene.starts_above_floor
-
-
 CONDITIONS: Mapping[str, Callable[[Scenario], bool]] = {
-    "Coulomb friction": _has_coulomb_friction,
+    "Coulomb friction": lambda scene: any(0.0 < surface.coefficient < np.inf for surface in scene.surfaces),
     "a floor": lambda scene: scene.floor is not None,
-    "a body that is not a ball, dropped on a floor": _strikes_with_a_corner,
+    "a body that is not a ball, dropped on a floor": lambda scene: scene.body.shape != "sphere" and scene.starts_above_floor,
     "a body that spins at the start": lambda scene: any(scene.start.angular_velocity),
     "damping": lambda scene: scene.damping is not None,
 }
@@ -96,45 +88,33 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     states = np.select([sizes + uncertain <= within, sizes - uncertain > within], ["within", "beyond"], "undecided")
     found = errors.assign(size=sizes, state=states, cost=errors["time_per_step"] / errors["dt"])
     keys = ["engine", "scene", "dt"]
-    steps = dict.fromkeys(tried[keys].itertuples(index=False, name=None), _Error("undecided"))
-    broken = dict.fromkeys(table.loc[is_broken, keys].itertuples(index=False, name=None), _Error("beyond"))
+    steps = tried[keys].assign(default=np.where(is_broken[tried.index], "beyond", "undecided")).drop_duplicates(keys)
     answers = []
     for metric in QUESTIONS:
-        rows = found[found["metric"] == metric]
-        own = dict(zip(rows[keys].itertuples(index=False, name=None), map(_Error, rows["state"], rows["size"], rows["cost"]), strict=True))
-        scenes = set(rows["scene"])
-        series: dict[str, dict[str, dict[float, _Error]]] = {engine: {} for engine in results.engines}
-        for (engine, scene, dt), error in (steps | own | broken).items():
-            if scene in scenes and engine in series:
-                series[engine].setdefault(scene, {})[dt] = error
-        answers += [_answer(metric, engine, len(scenes), of, results.scenes) for engine, of in series.items() if of]
+        rows = found.loc[found["metric"] == metric, [*keys, "state", "size", "cost"]]
+        tested = steps[steps["scene"].isin(rows["scene"])].merge(rows, how="left", on=keys)
+        tested["state"] = tested["state"].fillna(tested["default"])
+        for engine in results.engines:
+            series = tested[tested["engine"] == engine]
+            if len(series):
+                answers.append(_answer(metric, engine, rows["scene"].nunique(), series, results.scenes))
     return answers
 
 
-@dataclass(frozen=True)
-class _Error:
-    """An error at a time step: within the tolerance or not, its relative size, and the computing time per simulated second."""
-
-    state: str
-    size: float = math.nan
-    cost: float = math.nan
-
-
-def _answer(metric: str, engine: str, scenes: int, series: Mapping[str, Mapping[float, _Error]], models: Mapping[str, Scenario]) -> Answer:
-    """The answer from the errors of an engine by scene and time step."""
-    finest = {scene: errors[min(errors)] for scene, errors in series.items()}
-    of = {state: tuple(scene for scene, error in finest.items() if error.state == state) for state in ("within", "beyond", "undecided")}
-    kept = [series[scene] for scene in of["within"]]
-    common = sorted(set.intersection(*map(set, kept))) if kept else []
-    held = [dt for dt in common if all(error.state == "within" for errors in kept for step, error in errors.items() if step <= dt)]
+def _answer(metric: str, engine: str, scenes: int, series: pd.DataFrame, models: Mapping[str, Scenario]) -> Answer:
+    """The answer from an engine's rows of scene, time step, state, relative size of the error, and computing time per simulated second."""
+    finest = series.loc[series.groupby("scene", sort=False)["dt"].idxmin()]
+    of = {state: tuple(finest.loc[finest["state"] == state, "scene"]) for state in ("within", "beyond", "undecided")}
+    kept = series[series["scene"].isin(of["within"])]
+    counts = kept.groupby("dt")["scene"].nunique()
+    common = counts.index[counts == len(of["within"])].tolist()
+    held = [dt for dt in common if (kept.loc[kept["dt"] <= dt, "state"] == "within").all()]
     beyond, others = of["beyond"], [models[scene] for scene in (*of["within"], *of["undecided"])]
     only_beyond = {name: has for name, has in CONDITIONS.items() if not any(map(has, others))}
     having = {name: {scene for scene in beyond if has(models[scene])} for name, has in only_beyond.items()}
     condition = max(having, key=lambda name: len(having[name]), default="") if others else ""
     covered = having[condition] if condition and len(having[condition]) > 1 else set()
-    largest = [finest[scene].size for scene in beyond]
     dt = max(held, default=math.nan)
-    costs = [errors[dt].cost for errors in kept if dt in errors and not math.isnan(errors[dt].cost)]
     return Answer(
         metric=metric,
         engine=engine,
@@ -144,6 +124,6 @@ def _answer(metric: str, engine: str, scenes: int, series: Mapping[str, Mapping[
         steps=tuple(common),
         condition=condition if covered else "",
         named=tuple(scene for scene in beyond if scene not in covered),
-        largest=max((size for size in largest if not math.isnan(size)), default=math.nan),
-        cost=statistics.median(costs) if costs else math.nan,
+        largest=float(finest.loc[finest["state"] == "beyond", "size"].max()),
+        cost=float(kept.loc[kept["dt"] == dt, "cost"].median()),
     )

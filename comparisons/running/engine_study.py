@@ -267,13 +267,6 @@ class EngineStudy:
             points.append(self.added.get((entry.label, dt), {}).get(metric.name))
         return [point for point in points if point is not None]
 
-    def is_default_of(self, other: "EngineStudy") -> bool:
-        """Whether another engine is this one with calibrated instead of default settings."""
-        engine, calibrated = self.entry.engine, other.entry.engine
-        if engine is None or calibrated is None or engine.name != calibrated.name or "profile" in calibrated.options:
-            return False
-        return engine.options == {**calibrated.options, "profile": "default"}
-
 
 def _claim(run: EngineRun) -> Claim:
     """The properties that an engine declares, and the limitations that it met in a run."""

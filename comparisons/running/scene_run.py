@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, combinations
 from typing import Any
 
+from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.judging.agreement import judge_agreement
 from dropspin.comparisons.judging.error_budget import is_sufficient
 from dropspin.comparisons.judging.verdicts import Judgement
@@ -62,8 +63,9 @@ def run_scene(
             agreements += _agreement(own, first, second)
         if dt == min(dts) and own.scene.recording is None:
             distances += _distances_to_other_laws(own.scene, dt, phases, compared)
+    by_label = {study.entry.label: study for study in studies}
     for study in studies:
-        study.calibrated = next(filter(study.is_default_of, studies), None)
+        study.calibrated = by_label.get(calibrated_label(study.entry.label) or "")
     judged = []
     for study in studies:
         rows = list(study.rows(is_extrapolated=is_sufficient(sorted(dts))))

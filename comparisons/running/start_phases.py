@@ -19,7 +19,6 @@ from dropspin.comparisons.measuring.states import States
 from dropspin.comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
 from dropspin.comparisons.running.engine_run import EngineRun
 from dropspin.scenarios import Scenario, Trajectory, Truth
-from dropspin.scenarios.state import Array
 from dropspin.scenarios.truths.flight import flight_states
 from dropspin.scenarios.truths.measured import tosses
 
@@ -70,22 +69,20 @@ def number_of_phases(own: StartPhase, dt: float) -> int:
 def start_phases(scene: Scenario, truth: Truth | None, dt: float, *, quick: bool = False) -> list[StartPhase]:
     """The scene from `number_of_phases` starts, whose first impacts are at different phases of a time step, or only the scene itself."""
     count = number_of_phases(StartPhase(scene, truth, quick), dt)
-    if truth is not None and not truth.is_exact:
-        earlier = -(np.arange(PHASES_OF_TOSS) + 0.5) / PHASES_OF_TOSS * dt
-        return [phase for toss in tosses(scene)[: count // PHASES_OF_TOSS] for phase in _phases_of(*toss, earlier)]
     if truth is None or count == 1:
         return [StartPhase(scene, truth)]
-    delays = (np.arange(count) + 0.5) / count * dt
-    starts = zip(truth(delays).states, delays, strict=True)
-    return [StartPhase(scene.starting_at(state), truth.after(delay), delay=delay) for state, delay in starts]
-
-
-def _phases_of(scene: Scenario, toss: Truth, delays: Array) -> list[StartPhase]:
-    """A toss from states of its flight that are later by some times [s]."""
-    flight = flight_states(scene.initial_state, scene.body.inertia_tensor, scene.acceleration)
+    if truth.is_exact:
+        delays = (np.arange(count) + 0.5) / count * dt
+        motions = [(scene, truth, truth(delays).states)]
+    else:  # states of the flight before each toss
+        delays = -(np.arange(PHASES_OF_TOSS) + 0.5) / PHASES_OF_TOSS * dt
+        inertia, g = scene.body.inertia_tensor, scene.acceleration
+        chosen = tosses(scene)[: count // PHASES_OF_TOSS]
+        motions = [(start, toss, flight_states(start.initial_state, inertia, g)(delays)) for start, toss in chosen]
     return [
-        StartPhase(scene.starting_at(state), toss.after(delay), delay=delay)
-        for state, delay in zip(flight(delays), delays.tolist(), strict=True)
+        StartPhase(start.starting_at(state), motion.after(delay), delay=delay)
+        for start, motion, states in motions
+        for state, delay in zip(states, delays.tolist(), strict=True)
     ]
 
 

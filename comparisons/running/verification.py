@@ -57,9 +57,9 @@ def verified_lag(lag: Any, dt: float) -> float:
     return float(lag)
 
 
-def verify_start(engine: Engine, scene: Scenario, state: NDArray[np.float64], multiple: int = MULTIPLE) -> None:
-    """Raise `BuildMismatch` unless a state equals the scene's start to some eps, a spin to 64; q and -q are the same orientation."""
-    verify_starts(engine, [scene], state[np.newaxis], multiple)
+def verify_start(engine: Engine, scene: Scenario, state: NDArray[np.float64]) -> None:
+    """Raise `BuildMismatch` unless a state equals the scene's start to 8 eps, a spin to 64; q and -q are the same orientation."""
+    verify_starts(engine, [scene], state[np.newaxis], MULTIPLE)
 
 
 def verify_starts(engine: Engine, scenes: Sequence[Scenario], states: NDArray[np.float64], multiple: int = BATCH_MULTIPLE) -> None:

@@ -38,13 +38,12 @@ def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str 
     if baseline is None and not no_baseline and os.path.lexists(BASELINE):
         baseline = BASELINE
     results = load_results(Path(run), arrays=False)
-    file = None if baseline is None else story.BaselineFile(load_baseline(baseline), baseline, run)
+    accepted = None if baseline is None else load_baseline(baseline)
     try:
-        checked = check(results, None if file is None else file.baseline)
-        checked = checked if file is None else with_explaining_settings(checked, file.baseline)
+        checked = with_explaining_settings(check(results, accepted), accepted)
     except DropspinError as error:
         raise DropspinError(f"{baseline}: {error} With --no-baseline, only the expectations of the scenes are checked.") from None
-    document = story.document(checked, file, failures(checked.results, baseline))
+    document = story.document(checked, failures(checked.results, baseline), run, baseline)
     if junit is not None:
         write_text(junit, junit_xml(checked.results, baseline).decode())
     if summary is not None:

@@ -157,8 +157,7 @@ class _LazyGroup(click.Group):
         if cmd_name not in COMMANDS:
             return None
         module = _module_of(cmd_name)
-        command: click.Command = getattr(import_module(f"dropspin.reports.commands.{module}"), f"{module}_command")
-        return command
+        return getattr(import_module(f"dropspin.reports.commands.{module}"), f"{module}_command")
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         for title, names in GROUPS.items():

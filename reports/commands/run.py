@@ -91,14 +91,13 @@ def run_command(
         asked |= {"draw": count, "seed": seed}
         loaded += draw(count, seed)
         echo(f"Drawn with --seed {seed}", err=json_output)
-    file = None if baseline is None else story.BaselineFile(load_baseline(baseline), baseline, output)
+    accepted = None if baseline is None else load_baseline(baseline)
     results = _run(loaded, engines, asked, output, **options)
     try:
         if not json_output:
             print_table(results, summary_only=not verbose)
         try:
-            checked = check(results, None if file is None else file.baseline)
-            checked = checked if file is None else with_explaining_settings(checked, file.baseline)
+            checked = with_explaining_settings(check(results, accepted), accepted)
         except NothingAccepted as error:
             if json_output:
                 echo(json_text(results.table.to_dict("records")))
@@ -106,9 +105,9 @@ def run_command(
         if json_output:
             echo(json_text(checked.results.table.to_dict("records")))
         else:
-            if file is not None:
-                accepted = [failure for failure in failures(checked.results, baseline) if failure.accepted]
-                print_document(story.document(checked, file, accepted))
+            if baseline is not None:
+                failed = [failure for failure in failures(checked.results, baseline) if failure.accepted]
+                print_document(story.document(checked, failed, output, baseline))
             echo(f"Report: {os.path.join(output, 'report.html')}")
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the run is written: {output}") from None

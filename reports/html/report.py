@@ -8,6 +8,7 @@ import pandas as pd
 from dropspin.comparisons.judging.convergence import STUDIES
 from dropspin.comparisons.judging.verdicts import MARKS, OUTCOMES
 from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.predictions import spins_steadily
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.provenance import first_settings
@@ -22,7 +23,6 @@ from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.plots.colours import engine_colours
 from dropspin.reports.plots.convergence import PREDICTED
 from dropspin.reports.plots.figures import CHARTS
-from dropspin.reports.plots.spins import wobbles_freely
 from dropspin.reports.replay import as_data, replay_of
 from dropspin.reports.stories import numbers
 from dropspin.reports.stories.contacts import worst_contacts
@@ -130,7 +130,7 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
         "agreement": pairs[~pairs["metric"].isin(order)].to_dict("records"),
         "contacts": worst_contacts(results, name),
         "ensemble": ensemble.sort_values("metric", key=lambda metrics: metrics.map(order.index), kind="stable").to_dict("records"),
-        "wobbles": wobbles_freely(scene),
+        "wobbles": not spins_steadily(scene),
         "scales": [f"{scale(scene, unit):.3g} {unit}" for unit in dict.fromkeys(own["unit"]) if unit not in ("1", "rad")],
         "has_intervals": any(line.is_fill for line in convergence),
         "has_predictions": any(line.label == PREDICTED for line in convergence),

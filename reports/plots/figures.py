@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from dropspin.comparisons.judging.verdicts import FAILURES
+from dropspin.comparisons.measuring.predictions import spins_steadily
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.robustness.study import RobustnessStudy
 from dropspin.reports.plots.bounces import bounce_ladder
@@ -13,7 +14,7 @@ from dropspin.reports.plots.ensembles import angular_momentum_of_ensemble, energ
 from dropspin.reports.plots.growth import error_growth
 from dropspin.reports.plots.limits import failure_modes
 from dropspin.reports.plots.over_time import over_time, quantities
-from dropspin.reports.plots.spins import polhode, wobbles_freely
+from dropspin.reports.plots.spins import polhode
 from dropspin.reports.plots.tradeoff import error_over_cost, throughput
 from dropspin.scenarios import reference_for
 
@@ -62,7 +63,7 @@ def flight_charts(results: Results, scene_name: str) -> list[Chart]:
     truth = reference_for(scene)
     if scene.floor is not None or truth is None or not truth.is_exact:
         return []
-    paths = [polhode(results, scene_name)] if wobbles_freely(scene) else []
+    paths = [] if spins_steadily(scene) else [polhode(results, scene_name)]
     growing = _errors(results, scene_name, GROWTH, WORTH_A_LINE)[: MOST_PANELS - len(paths)]
     return [*paths, *(error_growth(results, scene_name, metric) for metric in growing)]
 

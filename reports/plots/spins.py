@@ -15,7 +15,7 @@ from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.chart import Chart, Line, draw
 from dropspin.reports.plots.style import MOST_POINTS, Array, at_one_step, stride
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
-from dropspin.scenarios.rotations import cross, unrotate
+from dropspin.scenarios.rotations import unrotate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,8 +24,6 @@ FARTHEST = 1.6
 """A path is drawn up to this multiple of the half axes, so that the ellipsoid stays visible."""
 FLATTEST = 0.4
 """Smallest length of the shortest half axis in the plot, relative to the longest."""
-NEARLY_PARALLEL = 1e-9
-"""A body whose ω and L enclose an angle with a smaller sine counts as spinning about a principal axis."""
 TOWARDS = np.array([0.48, 0.6, 0.64])
 """The direction towards the viewer, but for the signs, which are those of the middle of the path."""
 LABEL_POSITION = 1.2
@@ -100,14 +98,6 @@ def energy_ellipsoid(scene: Scenario) -> Array:
     """Half axes √(2 T / I) of the ellipsoid of angular velocities that have the initial rotational energy T [rad/s], shape (3,)."""
     moments, _ = _principal(scene)
     return np.sqrt(moments @ _start(scene) ** 2 / moments)
-
-
-def wobbles_freely(scene: Scenario) -> bool:
-    """Whether the angular velocity moves in the body frame: it is not parallel to the angular momentum, up to rounding."""
-    start = _start(scene)
-    momentum = _principal(scene)[0] * start
-    torque = np.linalg.norm(cross(momentum, start))
-    return bool(torque > NEARLY_PARALLEL * np.linalg.norm(momentum) * np.linalg.norm(start))
 
 
 def _principal(scene: Scenario) -> tuple[Array, Array]:

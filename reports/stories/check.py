@@ -3,12 +3,10 @@
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import pandas as pd
 
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES
-from dropspin.comparisons.regressions.baseline import Baseline
 from dropspin.comparisons.regressions.changes import broke_down, comparable_results, regressed
 from dropspin.comparisons.regressions.checking import Checked
 from dropspin.comparisons.results.provenance import versions_behind
@@ -22,35 +20,23 @@ from dropspin.scenarios.text import counted
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
 
 
-class BaselineFile(NamedTuple):
-    """A baseline, its file, and the folder of the run that is compared with it, as they appear in printed commands."""
+def document(checked: Checked, failures: Sequence[Failure], run: str, baseline: str | None) -> Document:
+    """The failures of each engine, and the outcome of a check; on a page also the numbers of the checks and the versions.
 
-    baseline: Baseline
-    path: str
-    run: str
-
-    @property
-    def accept_command(self) -> str:
-        """The command that accepts the run's results."""
-        return shlex.join(["dropspin", "accept", self.run, "--baseline", self.path, "--reason"]) + ' "…"'
-
-
-def document(checked: Checked, file: BaselineFile | None, failures: Sequence[Failure]) -> Document:
-    """The failures of each engine, and the outcome of a check; on a page also the numbers of the checks and the versions."""
-    results, listed = checked.results, failure_parts(checked.results, failures, file and file.path)
-    *notes, verdict = sentences(checked, file)
+    Args:
+        checked: The outcome.
+        failures: The failures to list.
+        run: The folder of the run, as it appears in printed commands.
+        baseline: The file of the baseline; None without one.
+    """
+    results, listed = checked.results, failure_parts(checked.results, failures, baseline)
+    *notes, verdict = sentences(checked, run, baseline)
     tallies = Table([_tally(results, engine) for engine in results.engines], on_terminal=False)
     versions = ", ".join(f"{name} {version}" for name, version in versions_behind(results.provenance).items())
     machine = Paragraph(f"{versions} on {results.provenance['cpu']}", on_terminal=False)
-    outcome = [Sentences([_scope(file), *notes]), Paragraph(verdict, on_page=False)]
+    scope = " only, without a baseline" if baseline is None else f", and the accepted results in {baseline}"
+    outcome = [Sentences([f"Checked: the expectations of the scenes{scope}.", *notes]), Paragraph(verdict, on_page=False)]
     return Document(f"dropspin: {'✗' if listed else '✓'} {verdict}", [*listed, tallies, machine], outcome)
-
-
-def _scope(file: BaselineFile | None) -> str:
-    """A sentence on what was checked."""
-    if file is None:
-        return "Checked: the expectations of the scenes only, without a baseline."
-    return f"Checked: the expectations of the scenes, and the accepted results in {file.path}."
 
 
 def _tally(results: Results, engine: str) -> dict[str, str]:
@@ -61,14 +47,14 @@ def _tally(results: Results, engine: str) -> dict[str, str]:
     return {"engine": engine, **verdicts, "broke down or missing": str(results.breakdowns[mine].sum())}
 
 
-def sentences(checked: Checked, file: BaselineFile | None) -> list[str]:
-    """The outcome of a check, the verdict last."""
+def sentences(checked: Checked, run: str, baseline: str | None) -> list[str]:
+    """The outcome of a check, the verdict last; the arguments are those of `document`."""
     table = checked.results.table
     without_baseline = replace(checked.results, table=table[table["kind"] != "baseline"])
     known = int((without_baseline.table["basis"] == "accepted_failure").sum())
     is_judged = not known or without_baseline.table["verdict"].isin(JUDGED).any()
     verdict = verdict_sentence(without_baseline, counts(without_baseline)) if is_judged else ""
-    if file is None:
+    if baseline is None:
         return [verdict]
     failed_rows = table[(table["kind"] == "baseline") & (table["verdict"] == "failed")]
     changes = checked.changes["change"].value_counts()
@@ -86,7 +72,8 @@ def sentences(checked: Checked, file: BaselineFile | None) -> list[str]:
         notes.append(f"{counted(known, 'known failure')}, not counted as failed.")
     acceptable = (~(broke_down(failed_rows, checked.results) & (failed_rows["metric"] == ""))).any()
     if acceptable or {"better", "new"} & set(changes.index):
-        notes.append(f"If the changes are intended: {file.accept_command}")
+        command = shlex.join(["dropspin", "accept", run, "--baseline", baseline, "--reason"])
+        notes.append(f'If the changes are intended: {command} "…"')
     return [*notes, _verdict(checked, failed_rows, verdict)]
 
 

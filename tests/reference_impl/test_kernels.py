@@ -110,7 +110,7 @@ def test_one_body_and_ensembles_are_one_kernel_in_the_cache():
     for states, dt in ((starts[0], 0.1), (starts, 0.1), (starts, np.array([0.1, 0.2, 0.3]))):
         reference_impl.simulate(states, Body(1.0, np.eye(3), np.zeros((1, 3)), (0.1, 0.1, 0.1)), world, dt, 1)
     kernel = recording_kernel(Methods(), reference_impl.kernels.Parts(True, False, False, False, False))
-    assert len(kernel.signatures) == 1
+    assert len(kernel.args[0].signatures) == 1
 
 
 def in_a_process(program, **environment):
@@ -161,7 +161,7 @@ body = r.Body(1.0, np.eye(3), np.zeros((1, 3)), (0.1, 0.1, 0.1))
 rows = r.simulate(np.array([0, 9, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.]), body, r.World(np.array([0, -1, 0])), 1.0, 1)
 from dropspin.reference_impl.kernels import Parts, recording_kernel
 kernel = recording_kernel(r.Methods(), Parts(gravity=True, forces=False, damping=False, floor=False, turning=False))
-print(rows[-1, 8], sum(kernel.stats.cache_hits.values()), numba.config.CACHE_DIR == before)
+print(rows[-1, 8], sum(kernel.args[0].stats.cache_hits.values()), numba.config.CACHE_DIR == before)
 """
 
 SHORT_FALL = """
@@ -169,7 +169,7 @@ import numba
 before = numba.config.CACHE_DIR
 from dropspin.reference_impl import fall, kernels
 kernel = kernels.compile_cached(fall.after)
-print(kernels.called(kernel, 1.0), sum(kernel.stats.cache_hits.values()), numba.config.CACHE_DIR == before)
+print(kernel(1.0), sum(kernel.args[0].stats.cache_hits.values()), numba.config.CACHE_DIR == before)
 """
 """As `FALL`, by a kernel of its own, which takes a tenth of the time to compile."""
 

@@ -145,9 +145,9 @@ def test_check_prints_the_cause_first(capsys):
     worse = run(scenes, Made(title="worse", change=with_gravity(1.01 * np.eye(3))), STEPS)
     checked = check(relabelled(worse, "worse", "mine"), accepted)
     found = failures(checked.results, "b.toml")
-    print_document(document(checked, None, found))
+    print_document(document(checked, found, "out/run", None))
     assert capsys.readouterr().out.startswith("Consistent with gravity 1 % too high.\n✗ ")
-    assert "\n- Consistent with gravity 1 % too high.\n- ✗ " in markdown(document(checked, None, found))
+    assert "\n- Consistent with gravity 1 % too high.\n- ✗ " in markdown(document(checked, found, "out/run", None))
 
 
 def test_moments_that_no_body_has_explain_no_error():

@@ -14,7 +14,7 @@ from dropspin.comparisons.regressions.checking import accept, check
 from dropspin.comparisons.regressions.comparing import compare
 from dropspin.comparisons.running import start_phases
 from dropspin.comparisons.running.run import run
-from dropspin.reports.stories.check import BaselineFile, sentences
+from dropspin.reports.stories.check import sentences
 
 BALL = SCENES[0]
 STEPS = [8e-3, 4e-3, 2e-3]
@@ -48,7 +48,7 @@ def accepted(earlier, tmp_path_factory):
 
 
 def said(checked, baseline):
-    return " ".join(sentences(checked, BaselineFile(baseline, "accepted.toml", "out/run")))
+    return " ".join(sentences(checked, "out/run", "accepted.toml"))
 
 
 def test_changed_metric_with_the_same_motions_is_a_correction_of_dropspin(accepted, monkeypatch):

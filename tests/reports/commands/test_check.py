@@ -13,7 +13,7 @@ from dropspin.comparisons.regressions.baseline import Baseline
 from dropspin.comparisons.regressions.checking import accept, check
 from dropspin.comparisons.running.run import run
 from dropspin.reports.junit import junit_xml
-from dropspin.reports.stories.check import BaselineFile, accepted_sentences, sentences
+from dropspin.reports.stories.check import accepted_sentences, sentences
 from dropspin.scenarios import load
 
 ENGINE, LABEL = "my_engine:MyEngine", "my-engine"
@@ -183,7 +183,7 @@ def test_known_failures_are_counted_apart(metric, accepted, outcome):
     found = run(expecting(metric), "mujoco", 4e-3)
     base, change = accept(found, Baseline(), "known", datetime.date(2026, 3, 1), known_failures=True)
     assert accepted_sentences(found, change, known_failures=True)[1:] == accepted
-    assert sentences(check(found, base), BaselineFile(base, "b.toml", "out")) == outcome
+    assert sentences(check(found, base), "out", "b.toml") == outcome
 
 
 @pytest.mark.parametrize(

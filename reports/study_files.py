@@ -1,14 +1,16 @@
 """The files that a study writes: tables as CSV and JSON, a Markdown page, pictures, and `section.json`, from which a report reads it."""
 
 import json
-from collections.abc import Mapping
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
 
 from dropspin.comparisons.regressions.comparing import History
-from dropspin.comparisons.results.folder import SECTION, file_name, read_stored
+from dropspin.comparisons.results.folder import SECTION, file_name, read_stored, study_folder
 from dropspin.reports.document import Charts, Document
 from dropspin.reports.markdown import markdown
 from dropspin.reports.output import write_table
@@ -17,29 +19,47 @@ from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.plots.figure import figure_of, save_figure
 from dropspin.reports.stories.history import document as history_document
 from dropspin.reports.stories.study import Study
+from dropspin.reports.terminal.rows import print_json_or
 from dropspin.scenarios import DropspinError, Scenario
 
 TOSSES = "tosses.json"
 """The file with the tosses of the scenes beside it."""
 
 
-def write_study(study: Study, folder: Path) -> Document:
-    """Write the files of a study, and return its page."""
+@contextmanager
+def written_study(output: str, json_output: bool, *, has_report: bool = False) -> Iterator[Callable[[Study], Path]]:
+    """A function that writes a study into the folder `output`, and returns the unfinished folder for other files; then it is printed.
+
+    Args:
+        output: The folder.
+        json_output: Whether to print the rows as JSON, or the page.
+        has_report: Whether to write the rows as Parquet too, and `report.html`.
+    """
+    kept: list[tuple[Study, Document]] = []
+    with study_folder(output) as folder:
+
+        def keep(study: Study) -> Path:
+            kept.append((study, write_study(study, folder, has_report=has_report)))
+            return folder
+
+        yield keep
+    for study, document in kept:
+        name = "report.html" if has_report else f"{study.study}.md"
+        print_json_or(json_output, study.rows(), document, os.path.join(output, name))
+
+
+def write_study(study: Study, folder: Path, *, has_report: bool = False) -> Document:
+    """Write the files of a study, as `written_study` does, and return its page."""
     document = study.document()
     write_table(folder, study.study, study.rows())
     write_page(document, folder, study.study)
     (folder / SECTION).write_text(study.model_dump_json(indent=1), encoding="utf-8")
-    return document
+    if has_report:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
 
-
-def write_study_and_page(study: Study, folder: Path) -> Document:
-    """Write the files of a study, its rows as Parquet too, and `report.html`; and return its page."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    document = write_study(study, folder)
-    pq.write_table(pa.Table.from_pylist(study.rows()), folder / f"{study.study}.parquet")
-    (folder / "report.html").write_text(page("study.html", section=document), encoding="utf-8")
+        pq.write_table(pa.Table.from_pylist(study.rows()), folder / f"{study.study}.parquet")
+        (folder / "report.html").write_text(page("study.html", section=document), encoding="utf-8")
     return document
 
 

@@ -1,6 +1,5 @@
 """`dropspin bugs`."""
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,11 +31,9 @@ def bugs_command(names: tuple[str, ...], is_to_prepare: bool, environments: str,
     Exit code: 1 if a release does not do what was reported, 3 if one could not be run.
     """
     from dropspin.comparisons.record.bugs import load_bugs, measure, prepare
-    from dropspin.comparisons.results.folder import study_folder
     from dropspin.comparisons.running.parallel import as_jobs
     from dropspin.reports.stories.bugs import KnownBugs, exit_code
-    from dropspin.reports.study_files import write_study
-    from dropspin.reports.terminal.rows import print_json_or
+    from dropspin.reports.study_files import written_study
 
     bugs, folder = load_bugs(names), Path(environments).absolute()
 
@@ -46,8 +43,7 @@ def bugs_command(names: tuple[str, ...], is_to_prepare: bool, environments: str,
 
     if is_to_prepare:
         prepare(bugs, folder, lambda text: echo(f"environment: {text}", err=True))
-    with study_folder(output) as unfinished:
+    with written_study(output, json_output) as keep:
         study = KnownBugs(bugs=bugs, outcomes=measure(bugs, folder, jobs=as_jobs(jobs), on_done=on_done))
-        document = write_study(study, unfinished)
-    print_json_or(json_output, study.rows(), document, os.path.join(output, "bugs.md"))
+        keep(study)
     return exit_code(study.verdicts())

@@ -30,16 +30,12 @@ def diagnose_command(file: str, output: str, json_output: bool, **options: Any) 
     Exit code: 0 no impossible inertia and no missed target, 1 otherwise, 2 bad input.
     """
     from dropspin.comparisons.diagnosis.study import diagnose
-    from dropspin.comparisons.results.folder import study_folder
     from dropspin.reports.stories.diagnose import Diagnosed
-    from dropspin.reports.study_files import write_study_and_page
+    from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar
-    from dropspin.reports.terminal.rows import print_json_or
 
-    with study_folder(output) as folder:
+    with written_study(output, json_output, has_report=True) as keep:
         with share_bar(os.path.basename(file)) as on_progress:
             diagnosis = diagnose(file, **options, on_progress=on_progress)
-        study = Diagnosed(diagnosis=diagnosis)
-        document = write_study_and_page(study, folder)
-    print_json_or(json_output, study.rows(), document, os.path.join(output, "report.html"))
+        keep(Diagnosed(diagnosis=diagnosis))
     return int(diagnosis.failed)

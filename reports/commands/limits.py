@@ -1,6 +1,5 @@
 """`dropspin limits`."""
 
-import os
 from typing import Any
 
 import click
@@ -36,13 +35,11 @@ def limits_command(scenes: tuple[str, ...], axes: tuple[str, ...], output: str, 
     The default is five scenes (two spins, a ball, a box, a block), with engines and methods that give different results for them; this
     takes some minutes.
     """
-    from dropspin.comparisons.results.folder import study_folder
     from dropspin.comparisons.robustness.axes import AXES
     from dropspin.comparisons.robustness.study import SCENES, find_limits
     from dropspin.reports.stories.limits import Limits
-    from dropspin.reports.study_files import write_study
+    from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar
-    from dropspin.reports.terminal.rows import print_json_or
     from dropspin.scenarios import load
 
     loaded = [load(name) for name in scenes or SCENES]
@@ -50,10 +47,8 @@ def limits_command(scenes: tuple[str, ...], axes: tuple[str, ...], output: str, 
         raise click.UsageError("two scenes have the same name, which is that of the file; rename one of the files.")
     having = [scene for scene in loaded if all(AXES[name].applies(scene) for name in {*axes} & AXES.keys())]
     results = []
-    with study_folder(output) as folder:
+    with written_study(output, json_output) as keep:
         for scene in having or loaded[:1]:  # the error of find_limits lists the axes of a scene
             with share_bar(scene.name) as on_progress:
                 results.append(find_limits(scene, axes=axes, **options, on_progress=on_progress))
-        study = Limits(scenes=results)
-        document = write_study(study, folder)
-    print_json_or(json_output, study.rows(), document, os.path.join(output, "limits.md"))
+        keep(Limits(scenes=results))

@@ -1,7 +1,5 @@
 """`dropspin log check`."""
 
-import os
-
 import click
 
 from dropspin.reports.commands.options import as_json, output_option
@@ -24,18 +22,14 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
     """
     from dropspin.comparisons.logs.check import log_check
     from dropspin.comparisons.logs.replay import measured_scene
-    from dropspin.comparisons.results.folder import study_folder
     from dropspin.reports.stories.log_check import CheckedLog
-    from dropspin.reports.study_files import write_scenes, write_study_and_page, write_toml
-    from dropspin.reports.terminal.rows import print_json_or
+    from dropspin.reports.study_files import write_scenes, write_toml, written_study
 
-    with study_folder(output) as folder:
+    with written_study(output, json_output, has_report=True) as keep:
         check = log_check(recording)
-        study = CheckedLog.of(recording, check)
-        document = write_study_and_page(study, folder)
+        folder = keep(CheckedLog.of(recording, check))
         write_toml(check.corrected.model_dump(mode="json", exclude_none=True), folder / "corrected.toml")
         can_continue = check.reads_the_columns_right and check.flights.log.header.floor is not None
         if can_continue and (scene := measured_scene(check.flights)) is not None:
             write_scenes(scene, folder / "scenes")
-    print_json_or(json_output, study.rows(), document, os.path.join(output, "report.html"))
-    return int(bool(study.findings))
+    return int(bool(check.findings))

@@ -1,6 +1,5 @@
 """`dropspin log compare`."""
 
-import os
 from typing import Any
 
 import click
@@ -27,18 +26,14 @@ def log_compare_command(recording: str, fits: bool, output: str, json_output: bo
     from dropspin.comparisons.logs.compare import ENGINES, log_compare
     from dropspin.comparisons.logs.fit import log_fit
     from dropspin.comparisons.logs.replay import flights_in
-    from dropspin.comparisons.results.folder import study_folder
     from dropspin.reports.stories.log_compare import ComparedLog
-    from dropspin.reports.study_files import write_study_and_page
+    from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar
-    from dropspin.reports.terminal.rows import print_json_or
 
     options["engines"] = options["engines"] or ENGINES
-    with study_folder(output) as folder:
+    with written_study(output, json_output, has_report=True) as keep:
         with share_bar(recording) as on_progress:
             flights = flights_in(recording)
             fit = log_fit(flights, **options, on_progress=on_progress) if fits else None
             comparison = log_compare(flights, fit=fit, **options, on_progress=on_progress)
-        study = ComparedLog(recording=recording, findings=list(log_check(flights).findings), comparison=comparison)
-        document = write_study_and_page(study, folder)
-    print_json_or(json_output, study.rows(), document, os.path.join(output, "report.html"))
+        keep(ComparedLog(recording=recording, findings=list(log_check(flights).findings), comparison=comparison))

@@ -1,6 +1,5 @@
 """`dropspin log fit`."""
 
-import os
 from typing import Any
 
 import click
@@ -25,16 +24,12 @@ def log_fit_command(recording: str, output: str, json_output: bool, **options: A
     from dropspin.comparisons.logs.check import log_check
     from dropspin.comparisons.logs.fit import log_fit
     from dropspin.comparisons.logs.replay import flights_in
-    from dropspin.comparisons.results.folder import study_folder
     from dropspin.reports.stories.log_fit import FittedLog
-    from dropspin.reports.study_files import write_study_and_page
+    from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar
-    from dropspin.reports.terminal.rows import print_json_or
 
-    with study_folder(output) as folder:
+    with written_study(output, json_output, has_report=True) as keep:
         with share_bar(recording) as on_progress:
             flights = flights_in(recording)
             fit = log_fit(flights, **options, on_progress=on_progress)
-        study = FittedLog(recording=recording, findings=list(log_check(flights).findings), fit=fit)
-        document = write_study_and_page(study, folder)
-    print_json_or(json_output, study.rows(), document, os.path.join(output, "report.html"))
+        keep(FittedLog(recording=recording, findings=list(log_check(flights).findings), fit=fit))

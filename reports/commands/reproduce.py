@@ -1,6 +1,5 @@
 """`dropspin reproduce`."""
 
-import os
 from typing import TYPE_CHECKING
 
 import click
@@ -27,20 +26,16 @@ def reproduce_command(names: tuple[str, ...], resources: "ResourceLimits", outpu
     """
     from dropspin.comparisons.published.sources import source_names, sources
     from dropspin.comparisons.published.study import reproduce
-    from dropspin.comparisons.results.folder import study_folder
     from dropspin.reports.stories.reproduce import Reproduction, exit_code
-    from dropspin.reports.study_files import write_study
+    from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar
-    from dropspin.reports.terminal.rows import print_json_or
 
     data = None
     if len(names) > 1 and names[-1] not in source_names() and any(source.data for source in sources(names[:-1])):
         names, data = names[:-1], names[-1]
     chosen = sources(names)
-    with study_folder(output) as folder:
+    with written_study(output, json_output) as keep:
         with share_bar("reproduce") as on_progress:
             results = reproduce(names, data=data, on_progress=on_progress, resources=resources)
-        study = Reproduction(sources=chosen, results=results)
-        document = write_study(study, folder)
-    print_json_or(json_output, study.rows(), document, os.path.join(output, "reproduce.md"))
+        keep(Reproduction(sources=chosen, results=results))
     return exit_code(results)

@@ -25,25 +25,21 @@ def symmetries_command(scenes: tuple[str, ...], dt: float, output: str, json_out
 
     Exit code: 0 for any finding, 2 bad input; `dropspin run --symmetries` fails if a symmetry is lost.
     """
-    from dropspin.comparisons.results.folder import study_folder
     from dropspin.comparisons.symmetries.study import SCENES, symmetries
     from dropspin.reports.html.replay import symmetries_page
     from dropspin.reports.stories.symmetries import Symmetries, worst_lost
-    from dropspin.reports.study_files import write_study
+    from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar
-    from dropspin.reports.terminal.rows import print_json_or
     from dropspin.reports.terminal.safe import echo
     from dropspin.scenarios import load
 
-    with study_folder(output) as folder:
+    with written_study(output, json_output) as keep:
         loaded = [load(name) for name in scenes or SCENES]
         with share_bar("symmetries") as on_progress:
             findings = symmetries(loaded, dt=dt, **options, on_progress=on_progress)
-        study = Symmetries(findings=findings)
-        document = write_study(study, folder)
+        folder = keep(Symmetries(findings=findings))
         if worst := worst_lost(findings):
             page = symmetries_page(worst, {scene.name: scene for scene in loaded}, dt)
             (folder / "symmetries.html").write_text(page, encoding="utf-8")
-    print_json_or(json_output, study.rows(), document, os.path.join(output, "symmetries.md"))
     if worst and not json_output:
         echo(f"Replay of the worst case of each engine: {os.path.join(output, 'symmetries.html')}")

@@ -1,6 +1,5 @@
 """`dropspin tradeoff`."""
 
-import os
 from typing import Any
 
 import click
@@ -40,16 +39,14 @@ def tradeoff_command(scenes: tuple[str, ...], within: tuple[float, ...], output:
 
     The default is the scene spin-asymmetric, with engines and methods that give different results for it.
     """
-    from dropspin.comparisons.results.folder import study_folder
     from dropspin.comparisons.tradeoff.study import NotCompared, tradeoff
     from dropspin.reports.stories.tradeoff import TradeOffs
-    from dropspin.reports.study_files import write_study
+    from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar
-    from dropspin.reports.terminal.rows import print_json_or
     from dropspin.scenarios import load
 
     loaded, results = [load(name) for name in scenes or ("spin-asymmetric",)], []
-    with study_folder(output) as folder:
+    with written_study(output, json_output) as keep:
         for scene in loaded:
             try:
                 with share_bar(scene.name) as on_progress:
@@ -58,6 +55,4 @@ def tradeoff_command(scenes: tuple[str, ...], within: tuple[float, ...], output:
                 if scene is loaded[-1] and not results:
                     raise
                 click.echo(f"left out: {error}", err=True)
-        study = TradeOffs(scenes=results, within=within)
-        document = write_study(study, folder)
-    print_json_or(json_output, study.rows(), document, os.path.join(output, "tradeoff.md"))
+        keep(TradeOffs(scenes=results, within=within))

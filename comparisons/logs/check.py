@@ -110,7 +110,7 @@ def log_check(recording: Flights | Log | str | Path) -> Check:
         DropspinError: It cannot be loaded, or no toss has a free flight.
     """
     flights = recording if isinstance(recording, Flights) else _flights(recording if isinstance(recording, Log) else load_log(recording))
-    drag = _drag(flights)
+    drag = regression([positions(flight, with_drag=True) for flight in flights.found])
     found = [*_of_units(flights), *of_quaternions(flights.log, flights), *of_spins(flights), *of_frames(flights)]
     check = Check(tuple(_values(flights, drag)), tuple(found), tuple(_tosses(flights)), flights)
     if not check.reads_the_columns_right:
@@ -145,11 +145,6 @@ def _acceleration(log: Log, down: Array) -> Array:
     return max([down, *candidates], key=falling)
 
 
-def _half_widths(found: Regression) -> Array:
-    """Beyond which a value is a finding, shape (m,)."""
-    return found.half_widths_of(ALARM)
-
-
 def _of_units(flights: Flights) -> Iterator[Finding]:
     """Of accelerations that are along another axis or far from gravity."""
     header, found = flights.log.header, flights.moving.values[ACCELERATION]
@@ -161,15 +156,11 @@ def _of_units(flights: Flights) -> Iterator[Finding]:
     if abs(ratio - 1.0) > UNIT:
         lengths = [unit for unit, value in LENGTHS.items() if abs(ratio * value / LENGTHS[header.length_unit] - 1.0) < UNIT]
         causes = [Cause("length unit", keys={"length_unit": unit}) for unit in lengths]
-        causes += [Cause("time unit", keys={"time_unit": unit}) for unit, value in TIMES.items() if _is_time(ratio, header, value)]
+        times = [unit for unit, value in TIMES.items() if abs(ratio * (value / TIMES[header.time_unit]) ** -2 - 1.0) < UNIT]
+        causes += [Cause("time unit", keys={"time_unit": unit}) for unit in times]
         causes += [_rate_cause(flights.log, rate**2) for rate in RATES if abs(ratio / rate**2 - 1.0) < UNIT]
         both = [_length_cause(header, ratio), _rate_cause(flights.log, ratio)]
         yield Finding("unit", ratio * header.gravity, header.gravity, causes=tuple(causes or both))
-
-
-def _is_time(ratio: float, header: Header, unit: float) -> bool:
-    """Whether times are in a unit [s] instead of the header's, so that gravity has a ratio to the true one."""
-    return abs(ratio * (unit / TIMES[header.time_unit]) ** -2 - 1.0) < UNIT
 
 
 def _length_cause(header: Header, ratio: float) -> Cause:
@@ -186,7 +177,7 @@ def _of_scale(flights: Flights) -> Iterator[Finding]:
     """Of gravity that is a little too large or small, or not vertical."""
     header, found = flights.log.header, flights.moving
     x, fall, z = found.values[ACCELERATION].tolist()
-    wide = _half_widths(found)
+    wide = found.half_widths(ALARM)
     ratio, error = -fall / header.gravity, wide[1] / header.gravity
     if abs(ratio - 1.0) > error:
         at_rest, spread, _, _ = rests(flights.log).scale()
@@ -206,7 +197,7 @@ def _of_offset(flights: Flights) -> Iterator[Finding]:
     """Of a centre of mass that is not where the header says."""
     header, found = flights.log.header, flights.moving
     off = header.tracked_from_centre - found.values[OFFSET]
-    is_off = np.abs(off) > _half_widths(found)[OFFSET]
+    is_off = np.abs(off) > found.half_widths(ALARM)[OFFSET]
     if is_off.any():
         _, _, moved, error = rests(flights.log).scale()
         seen, allowed = np.isfinite(moved) & is_off, 4.0 * error + 0.2 * np.abs(off)
@@ -226,8 +217,7 @@ def _rounded(values: Array) -> list[float]:
 
 def _moments(inertia: Array) -> list[Any]:
     """A tensor of inertia as a header has it: three moments, or rows."""
-    found: list[Any] = (np.diag(inertia) if is_diagonal(inertia) else inertia).tolist()
-    return found
+    return list((np.diag(inertia) if is_diagonal(inertia) else inertia).tolist())
 
 
 def _of_inertia(flights: Flights, drag: Regression) -> Iterator[Finding]:
@@ -235,21 +225,17 @@ def _of_inertia(flights: Flights, drag: Regression) -> Iterator[Finding]:
     found, body = flights.turning, flights.log.header.body
     stretched = np.exp(0.5 * np.array([found.values[0], 0.0, found.values[1]]))
     keys = {"body.inertia": _moments(body.inertia_tensor * np.outer(stretched, stretched))}
-    for kind, value, wide in zip(("inertia, x", "inertia, z"), found.values, _half_widths(found), strict=True):
+    for kind, value, wide in zip(("inertia, x", "inertia, z"), found.values, found.half_widths(ALARM), strict=True):
         if abs(value) > max(wide, 0.01):
             yield Finding(kind, math.exp(value), 1.0, causes=(Cause("moments of inertia", keys=keys),))
-    if drag.values[-1] > _half_widths(drag)[-1]:
+    if drag.values[-1] > drag.half_widths(ALARM)[-1]:
         yield Finding("drag", float(drag.values[-1]), 0.0)
-
-
-def _drag(flights: Flights) -> Regression:
-    return regression([positions(flight, with_drag=True) for flight in flights.found])
 
 
 def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
     """The values that flights give, each with its interval or with what it needs."""
     header, found = flights.log.header, flights.moving
-    wide = found.half_widths
+    wide = found.half_widths()
     fall, error = -float(found.values[1]), float(wide[1])
     yield Value("gravity", fall, fall - error, fall + error, "m/s²")
     yield Value("length scale", fall / header.gravity, (fall - error) / header.gravity, (fall + error) / header.gravity, "")
@@ -257,10 +243,10 @@ def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
     for axis, centre, error in zip("xyz", centres, wide[OFFSET], strict=True):
         yield Value(f"centre of mass, {axis}", centre, centre - error, centre + error, "m", OF_SIZE * header.body.size)
     turning = flights.turning
-    for name, value, error in zip(("I_x / I_y", "I_z / I_y"), turning.values, turning.half_widths, strict=True):
+    for name, value, error in zip(("I_x / I_y", "I_z / I_y"), turning.values, turning.half_widths(), strict=True):
         low, middle, high = (math.exp(min(value + step, MOST_LOG)) for step in (-error, 0.0, error))
         yield Value(f"{name} over the header's", middle, low, high, "", middle * math.sinh(OF_RATIO))
-    rate, error = drag.values[-1], drag.half_widths[-1]
+    rate, error = drag.values[-1], drag.half_widths()[-1]
     yield Value("drag", rate, rate - error, rate + error, "1/s", OF_DRAG)
     for name, noise, unit in (("position", found.noise, "m"), ("orientation", turning.noise, "rad")):
         yield Value(f"white noise of {name}", noise.white, math.nan, math.nan, unit)

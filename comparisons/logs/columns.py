@@ -2,11 +2,10 @@
 
 import io
 import json
-import struct
 import warnings
 import zipfile
-import zlib
 from collections.abc import Callable, Collection
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,19 +32,6 @@ LARGEST_FILE = 200_000_000  # bytes
 MOST_ROWS = 1_000_000
 LONGEST_NAME = 100
 """Characters of the name of a toss."""
-DAMAGED = (
-    ValueError,
-    ArithmeticError,
-    LookupError,
-    OSError,
-    RuntimeError,
-    TypeError,
-    EOFError,
-    struct.error,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""What the libraries raise for a damaged file."""
 Columns = dict[str, Any]
 """By name, a sequence of one value a row."""
 
@@ -64,19 +50,17 @@ def read_columns(path: Path, given: str, topic: str | None) -> tuple[dict[str, A
     Raises:
         DropspinError: The file is absent, damaged, too large or of another format, or has other columns, or values that are no numbers.
     """
-    readers: dict[str, Callable[[bytes, str], Columns]] = {
-        ".csv": _csv,
-        ".parquet": _parquet,
-        ".npz": _npz,
-        ".mcap": lambda raw, given: _mcap(raw, given, topic),
-    }
+    readers: dict[str, Callable[[bytes, str], Columns]]
+    readers = {".csv": _csv, ".parquet": _parquet, ".npz": _npz, ".mcap": partial(_mcap, topic=topic)}
     ending = path.suffix.lower()
     if ending not in readers:
         raise DropspinError(f"{given}: is not the data of a recording; give a file that ends in {', '.join(readers)}.")
     raw = read_file(path, given, "recording", LARGEST_FILE)
     try:
         columns = readers[ending](raw, given)
-    except DAMAGED as error:
+    except DropspinError:
+        raise
+    except Exception as error:  # whatever the libraries raise for a damaged file
         detail = printable(" ".join(str(error).split()) or type(error).__name__)
         raise DropspinError(f"{given}: is not {ending[1:].upper()}, or damaged: {detail:.200}.") from None
     lengths = {name: len(values) for name, values in columns.items()}
@@ -143,24 +127,19 @@ def _npz(raw: bytes, given: str) -> Columns:
 
 def _mcap(raw: bytes, given: str, topic: str | None) -> Columns:
     try:
-        from mcap.exceptions import McapError
         from mcap.reader import make_reader
-        from zstandard import ZstdError
     except ImportError:
         raise DropspinError(f"{given}: MCAP files need a package that is not installed: {install_extra('mcap')}.") from None
     rows: list[Any] = []
-    topics: dict[str, str] = {}
-    try:
-        for _, channel, message in make_reader(io.BytesIO(raw)).iter_messages(topic, log_time_order=False):
-            topics[channel.topic] = channel.message_encoding
-            rows.append(json.loads(message.data) if channel.message_encoding == "json" else {})
-            if len(topics) > 1:
-                raise DropspinError(f"{given}: has several topics ({', '.join(topics)}); name one in the header, as topic.")
-            if not isinstance(rows[-1], dict) or channel.message_encoding != "json":
-                raise DropspinError(f"{given}: a message of topic {channel.topic} is not a JSON object of the columns.")
-            _verify(given, rows[0], len(rows))
-    except (McapError, ZstdError) as error:
-        raise ValueError(str(error) or type(error).__name__) from None
+    topics: dict[str, None] = {}
+    for _, channel, message in make_reader(io.BytesIO(raw)).iter_messages(topic, log_time_order=False):
+        topics[channel.topic] = None
+        rows.append(json.loads(message.data) if channel.message_encoding == "json" else None)
+        if len(topics) > 1:
+            raise DropspinError(f"{given}: has several topics ({', '.join(topics)}); name one in the header, as topic.")
+        if not isinstance(rows[-1], dict):
+            raise DropspinError(f"{given}: a message of topic {channel.topic} is not a JSON object of the columns.")
+        _verify(given, rows[0], len(rows))
     if not rows:
         raise DropspinError(f"{given}: has no message{'' if topic is None else f' of topic {topic}'}.")
     return dict(pd.DataFrame.from_records(rows, columns=list(rows[0])))

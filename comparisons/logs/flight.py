@@ -6,7 +6,6 @@ p is the tracked point, at d from the centre of mass in the body frame. Frames a
 predicts it, within the noise that the recording itself shows.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -137,13 +136,9 @@ def accelerations(toss: Toss, size: int) -> Array:
     return 2.0 * np.einsum("wi,wki->wk", curved, pieces) / np.sum(curved**2, axis=1)[:, np.newaxis]
 
 
-def grown(flights: Sequence[Flight], found: Regression) -> list[Flight]:
-    """Flights from two frames less at both ends, as far as each next frame is where it is predicted."""
-    return [_grown(flight, found.values, found.noise, weight) for flight, weight in zip(flights, found.weights, strict=True)]
-
-
-def _grown(flight: Flight, shared: Array, noise: Noise, weight: float) -> Flight:
-    own = noise.of_weight(min(weight, 1.0))
+def grown(flight: Flight, found: Regression, weight: float) -> Flight:
+    """A flight from two frames less at both ends, as far as each next frame is where it is predicted."""
+    shared, own = found.values, found.noise.of_weight(min(weight, 1.0))
     less = min(2, (len(flight) - FEWEST_FRAMES) // 2)
     if less > 0:
         flight = replace(flight, first=flight.first + less, end=flight.end - less)

@@ -1,6 +1,5 @@
 """All flights of a recording: what they share, and the state at the end of each."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,12 +105,14 @@ def flights_of(log: Log, acceleration: Array) -> Flights | None:
         found = [flight for flight in flights if flight is not None]
         if not found:
             return None
-        moving = shared_motion(found)
-        regrown = iter(grown(found, moving))
-        flights = [None if flight is None else next(regrown) for flight in flights]
+        moving = regression(list(map(positions, found)))
+        weights = iter(moving.weights)
+        flights = [None if flight is None else grown(flight, moving, next(weights)) for flight in flights]
     found = [flight for flight in flights if flight is not None]
     rotations = tuple(rotation(flight, log.header.body.inertia_tensor) for flight in found)
-    return Flights(log, tuple(flights), shared_motion(found), rotations, regression([rotor.samples for rotor in rotations]))
+    return Flights(
+        log, tuple(flights), regression(list(map(positions, found))), rotations, regression([rotor.samples for rotor in rotations])
+    )
 
 
 def _above_floor(header: Header, flights: list[Flight | None]) -> list[Flight | None]:
@@ -128,8 +129,3 @@ def _height(header: Header, flight: Flight) -> float:
     position, orientation = flight.toss.position[frames], flight.toss.orientation[frames]
     states = np.hstack([position - rotate(orientation, header.tracked_from_centre), orientation])
     return float(clearances(states, header.body.vertices, header.body.semi_axes).max())
-
-
-def shared_motion(flights: Sequence[Flight]) -> Regression:
-    """Acceleration and d of flights, shape (6,)."""
-    return regression([positions(flight) for flight in flights])

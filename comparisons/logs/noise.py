@@ -127,12 +127,7 @@ class Regression:
         wider = np.sqrt(np.maximum(np.diag(by_noise) / np.maximum(np.diag(found), np.finfo(float).tiny), 1.0))
         return found * np.outer(wider, wider)
 
-    @property
-    def half_widths(self) -> Array:
-        """Of the 95 % intervals of θ, shape (m,)."""
-        return self.half_widths_of(0.05)
-
-    def half_widths_of(self, outside: float) -> Array:
+    def half_widths(self, outside: float = 0.05) -> Array:
         """Of intervals that θ is outside of with a probability, shape (m,): quantiles of Student's t.
 
         Its degrees of freedom are the number of flights minus 1; with few flights, the number of values minus that of the parameters.
@@ -172,7 +167,8 @@ def regression(flights: Sequence[Samples]) -> Regression:
         products, theta, determinant = parts(log_ratio)
         squares = float(weights @ left_over(products, theta))
         left = int(freedom.sum()) - shared
-        return determinant + left * np.log(squares) + _log_determinant(products, weights, shared)
+        values = np.linalg.eigvalsh(np.tensordot(weights, products, axes=1)[:shared, :shared])
+        return determinant + left * np.log(squares) + float(np.log(np.maximum(values, np.finfo(float).tiny)).sum())
 
     for _ in range(ROUNDS):
         ratio = float(minimize_scalar(deviance, bounds=(SLOWEST, FASTEST), method="bounded", options={"xatol": 0.02}).x)
@@ -192,11 +188,6 @@ def regression(flights: Sequence[Samples]) -> Regression:
 def _solution(products: Array, weights: Array, shared: int) -> Array:
     whole = np.tensordot(weights, products, axes=1)
     return np.asarray(np.linalg.lstsq(whole[:shared, :shared], whole[:shared, shared], rcond=None)[0], float)
-
-
-def _log_determinant(products: Array, weights: Array, shared: int) -> float:
-    values = np.linalg.eigvalsh(np.tensordot(weights, products, axes=1)[:shared, :shared])
-    return float(np.log(np.maximum(values, np.finfo(float).tiny)).sum())
 
 
 def end_of(samples: Samples, own_rates: Array, noise: Noise) -> tuple[Array, Array]:

@@ -89,7 +89,7 @@ def test_intervals_of_parameters_and_starts_hold(sets: int, count: int, body: di
         recording = made(100 + seed, count, (2e-4, 2e-3), offset=OFFSET, header={"tracked_point": OFFSET, "body": body})
         flights = found(recording.log)
         error = flights.moving.values - [*DOWN, *OFFSET]
-        inside += [*(np.abs(error) < flights.moving.half_widths), *(np.abs(flights.turning.values) < flights.turning.half_widths)]
+        inside += [*(np.abs(error) < flights.moving.half_widths()), *(np.abs(flights.turning.values) < flights.turning.half_widths())]
         starts.append(np.abs(misses(flights, recording.exact)) < 1.96)
     assert np.mean(inside) > 0.85
     assert 0.90 < np.mean(np.concatenate(starts)) < 0.99

@@ -123,7 +123,8 @@ def judged(
         acting: The settings that may act on it.
     """
     unknown, causes, free = body.facts.unknown, body.causes.get(answer.question, ()), answer.physical
-    acting = tuple(name for name in acting if _acts(body, name))
+    is_acting = {"damping": any(body.facts.falls), "armature": body.facts.armature, "gravcomp": body.facts.lifted}
+    acting = tuple(name for name in acting if is_acting[name])
     if unknown:
         differs = bool(abs(values[0] - free) > NOTEWORTHY * (100.0 if answer.unit == "%" else abs(free)))
         return replace(answer, measured=values[0], findings=(Finding("setting", (*unknown, *acting, *causes)),) * differs)
@@ -138,11 +139,6 @@ def judged(
         vanishes = abs(errors[-1]) < 0.6 * abs(errors[0])
         findings.append(Finding("time step" if vanishes else "model", (*causes, "timestep")))
     return replace(answer, measured=values[0], in_force=exact[0], limit=exact[0] + limit, findings=tuple(findings))
-
-
-def _acts(body: LooseBody, setting: str) -> bool:
-    facts = body.facts
-    return bool({"damping": any(facts.falls), "armature": facts.armature, "gravcomp": facts.lifted}[setting])
 
 
 def vector_text(axis: Array) -> str:

@@ -5,9 +5,9 @@ The body is simulated alone, above the surface that it may land on, which is the
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -95,18 +95,15 @@ class Facts:
     ignored: Sequence[tuple[str, Setting, str]]
     unmodelled: Sequence[str]
 
-    def lowest(self, states: Array) -> Array:
-        """Heights of the body's lowest point at states, shape (n,) [m]."""
-        return self._support.lowest(states)
+    @cached_property
+    def lowest(self) -> Callable[[Array], Array]:
+        """The function from states to the heights of the body's lowest point, shape (n,) [m]."""
+        return Support(self.colliding).lowest
 
     @property
     def lands(self) -> bool:
         """Whether there is a surface that gravity holds the body on."""
         return bool(self.surface) and self.gravity * (1.0 - self.lifted) > 0.0
-
-    @cached_property
-    def _support(self) -> "Support":
-        return Support(self.colliding)
 
     @property
     def colliding(self) -> Sequence[Part]:
@@ -186,14 +183,10 @@ class LooseBody(ABC):
     def changed(self, changes: Changes) -> "LooseBody":
         """The body with other settings."""
 
-    def tried(self, settings: Sequence[str]) -> "LooseBody":
-        """The body with the remedies of some settings, made once."""
-        key = tuple(settings)
-        if not key:
-            return self
-        if key not in self._tried:
-            self._tried[key] = self.changed(self.changes(settings))
-        return self._tried[key]
+    @cached_property
+    def tried(self) -> Callable[[tuple[str, ...]], "LooseBody"]:
+        """The function from settings to the body with their remedies, made once."""
+        return cache(lambda settings: self.changed(self.changes(settings)) if settings else self)
 
     def changes(self, settings: Sequence[str]) -> Changes:
         """The changes of the remedies of some settings."""
@@ -205,10 +198,6 @@ class LooseBody(ABC):
         dt, weight = self.facts.dt, -self.facts.gravity * UP
         found: Array = self.motions(self.facts.start()[np.newaxis], dt, math.ceil(SETTLED / dt), weight, floor=True)[0]
         return found
-
-    @cached_property
-    def _tried(self) -> dict[tuple[str, ...], "LooseBody"]:
-        return {}
 
     @abstractmethod
     def patch(self, changes: Changes, dt: float) -> str:

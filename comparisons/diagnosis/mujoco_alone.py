@@ -154,9 +154,9 @@ class MuJoCoAlone:
 
     def _in_force(self, pair: Mapping[str, Any]) -> dict[str, Any]:
         """The settings of a contact, with the time constant that MuJoCo raises to two of the file's steps."""
-        changed = {name: self._changes[name] for name in ("solref", "solimp") if name in self._changes}
+        changed = {name: np.array(str(self._changes[name]).split(), float) for name in ("solref", "solimp") if name in self._changes}
         still = {"margin": 0.0, "gap": 0.0} if "margin" in self._changes else {}
-        return dict(pair) | {"solref": self.clamped(pair)} | {name: as_numbers(value) for name, value in changed.items()} | still
+        return dict(pair) | {"solref": self.clamped(pair)} | changed | still
 
     def clamped(self, pair: Mapping[str, Any]) -> Array:
         """The time constant and the damping ratio that are in force at the file's time step."""
@@ -194,8 +194,3 @@ class MuJoCoAlone:
         axis = np.cross(up, UP)
         sine = np.linalg.norm(axis)
         return about(axis / sine if sine else np.array([1.0, 0.0, 0.0]), np.arctan2(sine, up @ UP))
-
-
-def as_numbers(text: str | float) -> Array:
-    """The numbers of an attribute."""
-    return np.array([float(value) for value in str(text).split()])

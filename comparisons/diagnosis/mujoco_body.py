@@ -13,12 +13,12 @@ from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_file import ENUMERATIONS, GEOM, OPTIONS, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
-from dropspin.comparisons.diagnosis.parts import Part, Support
+from dropspin.comparisons.diagnosis.parts import Part, Support, at_point
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.mujoco_model import contact
-from dropspin.comparisons.engines.mujoco_simulation import FULL_STATE, quiet
-from dropspin.scenarios.rotations import cross, multiply, rotate, unrotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
+from dropspin.comparisons.engines.mujoco_simulation import from_world, full_state, quiet, to_world
+from dropspin.scenarios.rotations import multiply, rotate
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.truths.settings import joint_damping
 
@@ -105,15 +105,8 @@ class MuJoCoBody(LooseBody):
     def motions(self, starts: Array, dt: float, steps: int, gravity: Array, *, floor: bool) -> Array:
         model = self._alone.model(dt, gravity, floor=floor)
         data = mujoco.MjData(model)
-        mujoco.mj_resetData(model, data)
-        first = np.empty((len(starts), mujoco.mj_stateSize(model, FULL_STATE)))
-        mujoco.mj_getState(model, data, first[0], FULL_STATE)
-        first[:] = first[0]
-        arms = rotate(starts[:, ORIENTATION], self._offset)
-        first[:, 1:4] = starts[:, POSITION] - arms
-        first[:, 4:8] = np.roll(starts[:, ORIENTATION], 1, axis=1)
-        first[:, 8:11] = starts[:, VELOCITY] - cross(starts[:, SPIN], arms)
-        first[:, 11:14] = unrotate(starts[:, ORIENTATION], starts[:, SPIN])
+        first = np.tile(full_state(model, data), (len(starts), 1))
+        first[:, 1:14] = from_world(at_point(starts, -self._offset))
         rows = np.empty((len(starts), 1 + steps, first.shape[1]))
         rows[:, 0] = first
         if steps:
@@ -121,13 +114,7 @@ class MuJoCoBody(LooseBody):
                 rows[:, 1:], _ = rollout.rollout(model, data, first, nstep=steps)
         if any(warning.number for warning in data.warning[-3:]) or not np.isfinite(rows).all():
             raise Diverged(f"MuJoCo's state became NaN or too large within {steps} steps of {dt:g} s")
-        found = np.empty((*rows.shape[:2], 13))
-        found[..., ORIENTATION] = np.roll(rows[..., 4:8], -1, axis=-1)
-        arms = rotate(found[..., ORIENTATION], np.broadcast_to(self._offset, (*rows.shape[:2], 3)))
-        found[..., SPIN] = rotate(found[..., ORIENTATION], rows[..., 11:14])
-        found[..., POSITION] = rows[..., 1:4] + arms
-        found[..., VELOCITY] = rows[..., 8:11] + cross(found[..., SPIN], arms)
-        return found
+        return at_point(to_world(rows[..., 1:14]), self._offset)
 
     def _mass_properties(self) -> tuple[Array, Array]:
         """The centre of mass in the frame of the body [m], and the inertia about it [kg m²], of the body and what is welded to it."""
@@ -151,7 +138,8 @@ class MuJoCoBody(LooseBody):
         alone, file = self._alone, self._file
         touching, surface = alone.touching, None if alone.touching is None else alone.surface
         raised = any(not np.array_equal(alone.clamped(pair), pair["solref"]) for pair in alone.pairs.values())
-        drag = Drag(*alone.damping[:2])
+        drag, option = Drag(*alone.damping[:2]), self._model.opt
+        unmodelled = {"frictionloss": self._model.dof_frictionloss.any(), "density": option.density, "viscosity": option.viscosity}
         pose = multiply(alone.level, np.roll(file.data.xquat[alone.head], -1))
         return Facts(
             name=self._name,
@@ -169,7 +157,7 @@ class MuJoCoBody(LooseBody):
             spins=(drag, drag, drag),
             armature=alone.armature,
             lifted=float(self._model.body_gravcomp[1]),
-            unknown=self._unknown_forces(),
+            unknown=[name for name, acts in unmodelled.items() if acts],
             surface="" if surface is None else self._names[surface],
             others=[self._names[geom] for geom in alone.others],
             friction=0.0 if touching is None or touching["condim"] == 1 else float(touching["friction"][0]),
@@ -198,11 +186,6 @@ class MuJoCoBody(LooseBody):
     @cached_property
     def _names(self) -> list[str]:
         return list(self._file.names(GEOM, self._file.model.ngeom))
-
-    def _unknown_forces(self) -> tuple[str, ...]:
-        """The settings of a fluid and of dry friction in the joint."""
-        found = ["frictionloss"] * bool(self._model.dof_frictionloss.any())
-        return (*found, *(name for name in ("density", "viscosity") if getattr(self._model.opt, name) > 0.0))
 
     def _rest_depth(self, pose: Array) -> float:
         """The depth of a body that rests on one point, or on several that share its weight, below the surface [m]; NaN of others."""

@@ -10,8 +10,8 @@ from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Mesh, S
 from dropspin.scenarios.bodies.hull import hull_corners
 from dropspin.scenarios.bodies.mesh import is_closed
 from dropspin.scenarios.bodies.mesh_files import Faces
-from dropspin.scenarios.rotations import rotate, unrotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, UP, Array
+from dropspin.scenarios.rotations import cross, rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 
 AXES = np.eye(3)
 TURNS = np.arange(150) * math.pi * (3.0 - math.sqrt(5.0))
@@ -54,6 +54,14 @@ class Support:
         heights = np.concatenate([up @ self._flat.T, up @ self._centres.T - depths], axis=1)
         found: Array = states[:, POSITION][:, 1] + heights.min(axis=1)
         return found
+
+
+def at_point(states: Array, arm: Array) -> Array:
+    """States of another point of a body, at an arm from the point of the given ones, in the body frame [m], shapes (..., 13) and (3,)."""
+    found, arms = states.copy(), rotate(states[..., ORIENTATION], arm)
+    found[..., POSITION] += arms
+    found[..., VELOCITY] += cross(states[..., SPIN], arms)
+    return found
 
 
 def volume(shape: Shape) -> float:

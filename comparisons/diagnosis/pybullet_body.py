@@ -16,7 +16,7 @@ import pybullet_data  # type: ignore[import-untyped]
 
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody
-from dropspin.comparisons.diagnosis.parts import Part, Support
+from dropspin.comparisons.diagnosis.parts import Part, Support, at_point
 from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Ignored, read_links
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.source import Setting
@@ -26,7 +26,7 @@ from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.pybullet_simulation import CHUNK, Z_TO_Y
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import UnknownName
-from dropspin.scenarios.rotations import conjugate, cross, multiply, rotate, unrotate
+from dropspin.scenarios.rotations import conjugate, multiply, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 from dropspin.scenarios.truths.settings import Resistance, bullet_damping
 
@@ -126,11 +126,10 @@ class PyBulletBody(LooseBody):
         bullet, inertial = server(), self._links[0].turn
         bullet.setTimeStep(dt)
         bullet.setGravity(*map(float, gravity))
-        turns = multiply(starts[:, ORIENTATION], np.broadcast_to(inertial, (len(starts), 4)))
-        arms = rotate(turns, self._arm)
-        places, speeds = starts[:, POSITION] - arms, starts[:, VELOCITY] - cross(starts[:, SPIN], arms)
         rows = np.empty((len(starts), 1 + steps, 13))
-        rows[:, 0] = np.concatenate([places, turns, speeds, starts[:, SPIN]], axis=1)
+        rows[:, 0] = starts
+        rows[:, 0, ORIENTATION] = multiply(starts[:, ORIENTATION], inertial)
+        rows[:, 0] = at_point(rows[:, 0], -self._arm)
         for row in rows:
             start = row[0].tolist()
             bullet.resetBasePositionAndOrientation(body, FAR, start[ORIENTATION])
@@ -138,13 +137,11 @@ class PyBulletBody(LooseBody):
             bullet.resetBasePositionAndOrientation(body, start[POSITION], start[ORIENTATION])
             bullet.resetBaseVelocity(body, start[VELOCITY], start[SPIN])
             for first in range(1, 1 + steps, CHUNK):
-                row[first : first + CHUNK] = bullet.states(body, min(CHUNK, 1 + steps - first))
+                row[first : first + CHUNK] = bullet.states_after_each(body, 1, min(CHUNK, 1 + steps - first))
         if not np.isfinite(rows).all():
             raise Diverged(f"PyBullet's state became NaN within {steps} steps of {dt:g} s")
-        arms = rotate(rows[..., ORIENTATION], np.broadcast_to(self._arm, (*rows.shape[:2], 3)))
-        rows[..., POSITION] += arms
-        rows[..., VELOCITY] += cross(rows[..., SPIN], arms)
-        rows[..., ORIENTATION] = multiply(rows[..., ORIENTATION], np.broadcast_to(conjugate(inertial), (*rows.shape[:2], 4)))
+        rows = at_point(rows, self._arm)
+        rows[..., ORIENTATION] = multiply(rows[..., ORIENTATION], conjugate(inertial))
         return rows
 
     def _world(self, floor: bool) -> tuple[int, int]:
@@ -199,7 +196,7 @@ class PyBulletBody(LooseBody):
             unmodelled=["joints"] if len(self._model.heads) > 1 else [],
         )
         if not parts or any(answer.findings for answer in inertia(facts)):
-            parts = [*parts, *(part for link in self._links for part in link.visual_parts(self._model, centre))]
+            parts = [*parts, *(part for link in self._links for part in link.parts(self._model, centre, visual=True))]
         x, y, z = (self._drag(axis, own, kappa) for axis in facts.principal[1].T)
         return replace(facts, spins=(x, y, z), parts=parts)
 

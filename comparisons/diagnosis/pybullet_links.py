@@ -74,35 +74,26 @@ class Link:
         turned: Array = axes @ tensor @ axes.T
         return turned
 
-    def parts(self, file: UrdfFile, centre: Array) -> Iterator[Part]:
-        """The geometries that collide, relative to the body's centre of mass."""
-        for element, part in self._placed(file, centre, "collision", self.geometry, (self.position, self.turn)):
-            if part is None:
-                raise DropspinError(f"{file.given}: line {element.line}: a geometry that is not a solid of finite size.")
-            yield part
+    def parts(self, file: UrdfFile, centre: Array, *, visual: bool = False) -> Iterator[Part]:
+        """The geometries that collide, relative to the body's centre of mass, or the solid ones of those that are visual.
 
-    def visual_parts(self, file: UrdfFile, centre: Array) -> Iterator[Part]:
-        """The solid visual geometries, relative to the body's centre of mass."""
-        turn = multiply(self.turn, conjugate(np.array(self.dynamics[4])))
-        frame = self.position - rotate(turn, np.array(self.dynamics[3])), turn
-        for _, part in self._placed(file, centre, "visual", _visual(file, self.element), frame):
-            if part is not None:
-                yield part._replace(collides=False)
-
-    def _placed(
-        self, file: UrdfFile, centre: Array, tag: str, geometry: Sequence[Any], frame: tuple[Array, Array]
-    ) -> Iterator[tuple[Element, Part | None]]:
-        """Geometries that PyBullet has in a frame, each with its element in the file; None for one that is not a solid."""
-        origin, turn = frame
-        for (_, _, kind, sizes, _, place, own), element in zip(geometry, self.element.every(tag), strict=True):
+        Raises:
+            DropspinError: One that collides is not a solid.
+        """
+        geometry, origin, turn = self.geometry, self.position, self.turn
+        if visual:
+            geometry, turn = _visual(file, self.element), multiply(self.turn, conjugate(np.array(self.dynamics[4])))
+            origin = self.position - rotate(turn, np.array(self.dynamics[3]))
+        elements = self.element.every("visual" if visual else "collision")
+        for (_, _, kind, sizes, _, place, own), element in zip(geometry, elements, strict=True):
             shape, turns = _shape(file, kind, sizes, element), multiply(turn, np.array(own))
-            if shape is None:
-                yield element, None
-                continue
-            position = origin + rotate(turn, np.array(place)) - centre + rotate(turns, shape.centre)
-            name = element.attributes.get("name", self.element.attributes["name"])
-            along = multiply(turns, conjugate(Z_TO_Y)) if isinstance(shape, Capsule | Cylinder) else turns
-            yield element, Part(name, shape, position, along)
+            if shape is not None:
+                position = origin + rotate(turn, np.array(place)) - centre + rotate(turns, shape.centre)
+                name = element.attributes.get("name", self.element.attributes["name"])
+                along = multiply(turns, conjugate(Z_TO_Y)) if isinstance(shape, Capsule | Cylinder) else turns
+                yield Part(name, shape, position, along, collides=not visual)
+            elif not visual:
+                raise DropspinError(f"{file.given}: line {element.line}: a geometry that is not a solid of finite size.")
 
     def ignored(self, surface: str, restitution: float) -> Iterator[Ignored]:
         """What the file says of the link and PyBullet changes or does not use.

@@ -9,13 +9,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from struct import pack
-
-import numpy as np
 
 from dropspin.comparisons.engines.pybullet_simulation import Connection
 from dropspin.scenarios import DropspinError
-from dropspin.scenarios.state import Array
 
 
 class Server(Connection):
@@ -37,16 +33,6 @@ class Server(Connection):
         self.holds = None
         self.resetSimulation()
         self.setPhysicsEngineParameter(enableFileCaching=0)
-
-    def states(self, body: int, count: int) -> Array:
-        """The states of the inertial frame after each of some steps, shape (count, 13)."""
-        bullet, client, numbers = self.module, self.client, list[float]()
-        step, pose, rates = bullet.stepSimulation, bullet.getBasePositionAndOrientation, bullet.getBaseVelocity
-        for _ in range(count):
-            step(client)
-            for part in (*pose(body, client), *rates(body, client)):
-                numbers += part
-        return np.frombuffer(pack(f"{len(numbers)}d", *numbers)).reshape(-1, 13)
 
 
 @cache

@@ -52,25 +52,19 @@ def answers_to(question: Question, body: LooseBody) -> Iterator[Answer]:
         return
 
     @cache
-    def again(settings: tuple[str, ...], step: float) -> list[Answer]:
-        """The answers with the remedies of some settings at another time step [s]; none of a breakdown."""
+    def again(settings: tuple[str, ...] | frozenset[str], step: float) -> list[Answer]:
+        """The answers with the remedies of settings, or with a set of them reverted alone, at a time step [s]; none of a breakdown."""
         try:
-            return question(body.tried(settings), [step])
-        except Diverged:
-            return []
-
-    @cache
-    def without(reverted: frozenset[str]) -> list[Answer]:
-        """The answers without the effects of some settings; none of a breakdown."""
-        try:
-            return question(body.changed({name: body.remedies[name][name] for name in reverted}), [dt])
+            if isinstance(settings, tuple):
+                return question(body.tried(settings), [step])
+            return question(body.changed({name: body.remedies[name][name] for name in settings}), [step])
         except Diverged:
             return []
 
     for number, answer in enumerate(answers):
 
         def effect(reverted: frozenset[str], n: int = number) -> float:
-            return next((other.effect for other in without(reverted)[n : n + 1]), math.nan)
+            return next((other.effect for other in again(reverted, dt)[n : n + 1]), math.nan)
 
         explained = [_explained(body, finding, effect) for finding in answer.findings]
         findings = [_remedied(body, answer, finding, lambda *tried, n=number: again(*tried)[n : n + 1]) for finding in explained]

@@ -29,6 +29,7 @@ READERS = {".xml": ("mujoco",), ".mjcf": ("mujoco",), ".urdf": ("mujoco", "pybul
 """The engines that read a file, by its ending."""
 MESH = """<mujoco><asset><mesh name="mesh" file="{path}"/></asset><worldbody><geom type="plane" size="0 0 1"/>
 <body name="{name}"><freejoint/><geom type="mesh" mesh="mesh" density="{density:g}"/></body></worldbody></mujoco>"""
+"""A model with a body whose only geometry is a mesh, above a plane."""
 Found = TypeVar("Found")
 OF_FACTS = ("name", "engine", "version", "dt", "mass", "surface", "friction")
 """What a diagnosis has as an engine has it in force."""
@@ -148,7 +149,10 @@ def diagnose(
             raise DropspinError(f"{engine} does not read {ending} files; use {' or '.join(READERS[ending])}.")
     with tempfile.TemporaryDirectory() as folder:
         if ending in (".obj", ".stl"):
-            path = _around_mesh(path, given, density, Path(folder))
+            read_mesh(path, given)
+            text = MESH.format(path=path.resolve(), name=path.stem, density=density)
+            path = Path(folder, "mesh.xml")
+            path.write_text(text, encoding="utf-8")
         entries = [present_entry(engine) for engine in chosen]
         with started_crews(1, 1, entries, resources) as crews:
             read = [(entry, crews[0].call(entry, _bodies, path, given, wanted, loose)) for entry in entries]
@@ -175,14 +179,6 @@ def _checked(given: str, found: Found | DropspinError | Breakdown) -> Found:
     if isinstance(found, DropspinError):
         raise found
     return found
-
-
-def _around_mesh(path: Path, given: str, density: float, folder: Path) -> Path:
-    """A model with a body whose only geometry is a mesh, above a plane."""
-    read_mesh(path, given)
-    model = folder / "mesh.xml"
-    model.write_text(MESH.format(path=path.resolve(), name=path.stem, density=density), encoding="utf-8")
-    return model
 
 
 @lru_cache(maxsize=1)

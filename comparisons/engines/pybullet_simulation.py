@@ -149,19 +149,8 @@ class PyBulletSimulation(Simulation):
         return self._states_after_each(0, 1)[0].copy()
 
     def _states_after_each(self, steps: int, count: int) -> Array:
-        """The states after each of `count` times `steps` steps, shape (count, 13), without look-ups: reading costs as much as a step."""
-        bullet, client, body, numbers = self._bullet.module, self._bullet.client, self._body, list[float]()
-        step, pose, rates = bullet.stepSimulation, bullet.getBasePositionAndOrientation, bullet.getBaseVelocity
-        for _ in range(count):
-            for _ in range(steps):
-                step(client)
-            position, orientation = pose(body, client)
-            velocity, spin = rates(body, client)
-            numbers += position
-            numbers += orientation
-            numbers += velocity
-            numbers += spin
-        rows = np.frombuffer(pack(f"{len(numbers)}d", *numbers)).reshape(-1, 13)
+        """The states of the scene's body after each of `count` times `steps` steps, shape (count, 13)."""
+        rows = self._bullet.states_after_each(self._body, steps, count)
         if self._to_body is None:
             return rows
         return np.hstack([rows[:, POSITION], multiply(rows[:, ORIENTATION], self._to_body), rows[:, RATES]])
@@ -205,6 +194,24 @@ class Connection:
     def __getattr__(self, name: str) -> Any:
         found = getattr(self.module, name)
         return partial(found, physicsClientId=self.client) if callable(found) else found
+
+    def states_after_each(self, body: int, steps: int, count: int) -> Array:
+        """The states of a body's inertial frame after each of `count` times `steps` steps, shape (count, 13).
+
+        There are no look-ups in the loop, because reading costs as much as a step.
+        """
+        bullet, client, numbers = self.module, self.client, list[float]()
+        step, pose, rates = bullet.stepSimulation, bullet.getBasePositionAndOrientation, bullet.getBaseVelocity
+        for _ in range(count):
+            for _ in range(steps):
+                step(client)
+            position, orientation = pose(body, client)
+            velocity, spin = rates(body, client)
+            numbers += position
+            numbers += orientation
+            numbers += velocity
+            numbers += spin
+        return np.frombuffer(pack(f"{len(numbers)}d", *numbers)).reshape(-1, 13)
 
 
 _idle: dict[frozenset[str], list[tuple[Connection, int]]] = {}

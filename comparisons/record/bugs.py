@@ -148,15 +148,14 @@ def verdict(bug: Bug, outcomes: Sequence[Outcome]) -> Verdict:
     """The verdict on a report, from what its releases did, oldest first."""
     if bug.why_not:
         return Verdict("not expressible")
-    measured = [outcome for outcome in outcomes if outcome.state != "not run"]
-    if len(measured) < len(outcomes) or not measured:
+    states = [outcome.state for outcome in outcomes]
+    if not states or "not run" in states:
         return Verdict("not run")
-    states = [outcome.state for outcome in measured]
     if states[-1] == "shown":
         return Verdict("shown")
     if "shown" in states and states[-1] == "not shown":
         last = len(states) - 1 - states[::-1].index("shown")
-        return Verdict("fixed", measured[last + 1].release)
+        return Verdict("fixed", outcomes[last + 1].release)
     return Verdict("not shown")
 
 

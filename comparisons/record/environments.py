@@ -7,6 +7,7 @@ that is imported. pip chooses wheels only, and npm runs no scripts, so that no c
 import json
 import re
 import sys
+import sysconfig
 import venv
 from collections.abc import Sequence
 from contextlib import suppress
@@ -35,7 +36,8 @@ def releases(package: str, oldest: str) -> list[str]:
     Raises:
         DropspinError: pip or npm is not installed, cannot ask its index, or the index lacks the package or the oldest release.
     """
-    listed = _npm_releases(package) if is_npm(package) else _pip_releases(package)
+    named = _npm_view(package, "versions") if is_npm(package) else _pip_releases(package)
+    listed = [name for name in named if not is_npm(package) or re.fullmatch(r"\d+(\.\d+)*", name)]  # without npm's prereleases
     verify_known(f"{package}'s oldest release", [oldest], listed)
     return listed[listed.index(oldest) :]
 
@@ -59,11 +61,6 @@ def _pip_releases(package: str, *options: str) -> list[str]:
     if code or found is None:
         raise DropspinError(f"pip cannot list the releases of {package}: {last_line(output)}; record needs pip, and access to its index.")
     return found[1].split(", ")[::-1]
-
-
-def _npm_releases(package: str) -> list[str]:
-    """Without prereleases."""
-    return [name for name in _npm_view(package, "versions") if re.fullmatch(r"\d+(\.\d+)*", name)]
 
 
 def _npm_view(package: str, field: str) -> Any:
@@ -130,7 +127,11 @@ def installed(folder: Path, package: str, requirements: Sequence[str], stopping:
         Breakdown: It cannot be installed here, which may be possible another day (`missing`).
         Closed: `stopping` was set.
     """
-    python = _environment(folder)
+    venv.create(folder, symlinks=True)
+    python = python_of(folder)
+    # The running environment's packages come last on the path.
+    packages = Path(sysconfig.get_path("purelib", "venv", {"base": str(folder)}))
+    (packages / "running.pth").write_text("\n".join([*filter(None, sys.path), str(HOME)]), encoding="utf-8")
     if is_npm(package):
         install = [_npm(package), "install", "--prefix", str(folder), "--no-save", "--ignore-scripts", "--no-audit", "--loglevel=error"]
     else:
@@ -144,17 +145,6 @@ def installed(folder: Path, package: str, requirements: Sequence[str], stopping:
 def python_of(folder: Path) -> str:
     """The path of the Python of an environment."""
     return str(venv.EnvBuilder(symlinks=True).ensure_directories(folder).env_exe)
-
-
-def _environment(folder: Path) -> str:
-    """Make a virtual environment, in which the running environment's packages come last on the path; the path of its Python."""
-    builder = venv.EnvBuilder(symlinks=True)
-    context = builder.ensure_directories(folder)
-    builder.create(folder)
-    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
-    packages = folder / ("Lib" if sys.platform == "win32" else f"lib/{version}") / "site-packages"
-    (packages / "running.pth").write_text("\n".join([*filter(None, sys.path), str(HOME)]), encoding="utf-8")
-    return str(context.env_exe)
 
 
 def run(command: Sequence[str], stopping: Event) -> tuple[int, str]:

@@ -97,18 +97,17 @@ class Contact(NamedTuple):
 
 def check_impacts(engine: Engine) -> str:
     """No mistake explains the first impact of bodies that are thrown at a floor; the probes test whether the impact is right."""
-    accepted, refusal = 0, None
-    for name, content in read_toml(FILE, FILE.name).items():
-        scene = with_height(from_mapping({"name": name.replace(" ", "-"), **content}), NEAR)
-        refusal = engine.refusal(scene)
-        if refusal is None:
-            accepted += 1
-            mistake = explain_impact(scene, record(engine, scene, DT, verify=False).motion)
-            if mistake is not None and mistake not in PECULIARITIES:
-                raise CheckFailed(f"{mistake} ({name})")
+    tables = read_toml(FILE, FILE.name).items()
+    scenes = {name: with_height(from_mapping({"name": name.replace(" ", "-"), **content}), NEAR) for name, content in tables}
+    refusals = {name: engine.refusal(scene) for name, scene in scenes.items()}
+    accepted = [name for name, refusal in refusals.items() if refusal is None]
+    for name in accepted:
+        mistake = explain_impact(scenes[name], record(engine, scenes[name], DT, verify=False).motion)
+        if mistake is not None and mistake not in PECULIARITIES:
+            raise CheckFailed(f"{mistake} ({name})")
     if not accepted:
-        raise Declined(f"the engine declines all scenes: {refusal}")
-    return f"no known mistake explains an impact in {counted(accepted, 'scene')}"
+        raise Declined(f"the engine declines all scenes: {list(refusals.values())[-1]}")
+    return f"no known mistake explains an impact in {counted(len(accepted), 'scene')}"
 
 
 def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:

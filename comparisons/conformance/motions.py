@@ -9,13 +9,13 @@ symptoms are stated: which quantities differ from the exact solution, and by how
 import math
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
-from itertools import chain, combinations
+from itertools import combinations
 
 import numpy as np
 
 from dropspin.comparisons.conformance.impacts import OF_NOTE, PECULIARITIES, decaying_restitution, explain_impact
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
-from dropspin.comparisons.conformance.probes import DT, PROBES, Probe, differences, exact_solution
+from dropspin.comparisons.conformance.probes import DT, PROBES, Probe, differences
 from dropspin.comparisons.engines.base import Engine, KnownLimitation
 from dropspin.comparisons.faults.fault_model import FaultModel
 from dropspin.comparisons.faults.mistakes import MISTAKES, Mistake
@@ -27,11 +27,12 @@ from dropspin.comparisons.running.recording import Breakdown, record, try_record
 from dropspin.scenarios import Scenario, Trajectory, truth_for
 from dropspin.scenarios.state import RATES, SPIN, VELOCITY, Array
 from dropspin.scenarios.text import rounded
-from dropspin.scenarios.truths import LAWS, Law
+from dropspin.scenarios.truths import LAWS, Law, exact_solution
 
 Fault = FaultModel | Mistake
 SINGLY: tuple[Fault, ...] = (*(fault for fault in FAULT_MODELS if fault.about != "start"), *SHAPE_FAULTS, *MISTAKES)
 """The start has a check of its own."""
+PAIRS = tuple(first.and_also(second) for first, second in combinations(FAULT_MODELS, 2) if first.about != second.about)
 QUANTITIES = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("angular velocity", "rad/s"))
 """Those of `differences`."""
 CLEAR = 1e-3
@@ -112,13 +113,13 @@ def explain_motion(probe: Probe, states: Array, motion_of: Callable[[Probe], Arr
         motion_of: Function from another probe to the engine's states of it, or to None if the engine has none.
     """
     # The exact solution of a box on its corner takes too long for thousands of pairs.
-    counts = (1, 2) if _has_pairs(probe) else (1,)
     shapes = {*Engine.shapes, probe.scene.body.shape}
-    for count in counts:
-        motions = _motions_with_faults(probe, count)
+    for faults in (SINGLY, PAIRS) if _has_pairs(probe) else (SINGLY,):
+        motions = _motions(probe, faults)
         off = dict(zip(motions, np.round(probe.off(states, np.array([*motions.values()])), 3), strict=True))
         candidates = sorted((fault for fault in motions if off[fault] <= 1.0), key=off.__getitem__)
-        others = [other for other in PROBES if other != probe and other.scene.body.shape in shapes and (count == 1 or _has_pairs(other))]
+        known = PROBES if faults is SINGLY else list(filter(_has_pairs, PROBES))
+        others = [other for other in known if other != probe and other.scene.body.shape in shapes]
         best = _best(candidates, others, motion_of)
         if best is not None:
             return best
@@ -133,7 +134,7 @@ def _best(candidates: Iterable[Fault], probes: Iterable[Probe], motion_of: Calla
     """The fault that gives the engine's states of the most probes, without those that change a probe in which the engine is right."""
     explained = dict.fromkeys(candidates, 0)
     for probe in probes:
-        exact, motions = probe.exact, _motions(probe, explained)
+        exact, motions = probe.exact, _motions(probe, tuple(explained))
         changed = {fault: states for fault, states in motions.items() if probe.off(states, exact) > 1.0}
         of_engine = motion_of(probe) if changed else None
         if of_engine is None:
@@ -147,11 +148,7 @@ def _best(candidates: Iterable[Fault], probes: Iterable[Probe], motion_of: Calla
 
 
 @cache
-def _motions_with_faults(probe: Probe, count: int) -> dict[Fault, Array]:
-    return _motions(probe, SINGLY if count == 1 else _pairs())
-
-
-def _motions(probe: Probe, faults: Iterable[Fault]) -> dict[Fault, Array]:
+def _motions(probe: Probe, faults: tuple[Fault, ...]) -> dict[Fault, Array]:
     """The states of a probe with each of some faults for which they are known, shape (2, 13)."""
     return {fault: states for fault in faults if (states := fault.motion(probe.scene, probe.times)) is not None}
 
@@ -159,16 +156,12 @@ def _motions(probe: Probe, faults: Iterable[Fault]) -> dict[Fault, Array]:
 def explain_start(scene: Scenario, state: Array, allowed: float) -> FaultModel | None:
     """The fault, or the two, that give a state at the start, shape (13,), within `allowed` times its largest number, if any."""
     close = allowed * np.abs(scene.initial_state).max()
-    for fault in chain(FAULT_MODELS, _pairs()):
+    for fault in (*FAULT_MODELS, *PAIRS):
         start = fault.start(scene)
         # A fault made both when setting and when reading a state cancels at the start, which then is no evidence of it.
         if np.abs(start - state).max() <= close < np.abs(start - scene.initial_state).max():
             return fault
     return None
-
-
-def _pairs() -> Iterable[FaultModel]:
-    return (first.and_also(second) for first, second in combinations(FAULT_MODELS, 2) if first.about != second.about)
 
 
 def symptoms(probe: Probe, motion: Trajectory) -> Iterator[str]:

@@ -9,10 +9,11 @@ import numpy as np
 from dropspin.comparisons.conformance.outcomes import Declined
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.running.recording import record
-from dropspin.scenarios import Scenario, Trajectory, Truth, truth_for
+from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.loading import from_mapping, read_toml
 from dropspin.scenarios.rotations import angle_between_orientations
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
+from dropspin.scenarios.truths import exact_solution
 
 FILE = Path(__file__).with_name("probes.toml")
 DT = 2.5e-4
@@ -85,21 +86,11 @@ def accepted_scene(engine: Engine, *preferred: str) -> Scenario:
         scene = probes[name].scene
         refusal = engine.refusal(scene)
         if refusal is None:
-            return _shortly_before_contact(scene) if scene.starts_above_floor else scene
+            if not scene.starts_above_floor:
+                return scene
+            exact = exact_solution(scene)
+            return scene.starting_at(exact(exact.events[0].time - 5.5 * DT).states[0])
     raise Declined(f"the engine declines {', '.join(preferred or RICHEST)}: {refusal}")
-
-
-def _shortly_before_contact(scene: Scenario) -> Scenario:
-    """The scene, started so late that a few steps reach the floor."""
-    exact = exact_solution(scene)
-    return scene.starting_at(exact(exact.events[0].time - 5.5 * DT).states[0])
-
-
-def exact_solution(scene: Scenario) -> Truth:
-    """The exact solution of a probe's scene; each probe has one."""
-    truth = truth_for(scene)
-    assert truth is not None
-    return truth
 
 
 def few_steps(engine: Engine, scene: Scenario, dt: float) -> Trajectory:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyfit, polyval
 
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
-from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, accepted_scene, exact_solution, few_steps, recorded, state_after
+from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, accepted_scene, few_steps, recorded, state_after
 from dropspin.comparisons.conformance.protocol import relative_difference
 from dropspin.comparisons.engines.base import Engine, Simulation
 from dropspin.comparisons.running.timing import time_steps
@@ -18,6 +18,7 @@ from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import angle_between_orientations
 from dropspin.scenarios.state import ORIENTATION, POSITION, VELOCITY, Array
 from dropspin.scenarios.text import rounded
+from dropspin.scenarios.truths import exact_solution
 
 STEPS_TRIED = (0.01, 0.0025, 0.00025)
 NEAR_ENOUGH = 0.02

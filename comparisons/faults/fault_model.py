@@ -18,14 +18,9 @@ Change = Callable[[Array, Array], Array]
 """From the orientations of states and a part of them to the changed part."""
 
 
-def unchanged_scene(scene: Scenario) -> Scenario:
-    """The scene itself."""
-    return scene
-
-
-def unchanged_states(states: Array) -> Array:
-    """The states themselves."""
-    return states
+def unchanged(given: Any) -> Any:
+    """The scene, or the states, as given."""
+    return given
 
 
 class FaultModel(NamedTuple):
@@ -40,8 +35,8 @@ class FaultModel(NamedTuple):
     """
 
     message: str
-    simulated: Simulated = unchanged_scene
-    reported: Reported = unchanged_states
+    simulated: Simulated = unchanged
+    reported: Reported = unchanged
     is_peculiarity: bool = False
     about: str = ""
 

@@ -96,10 +96,8 @@ class Mistake:
 def _integrated(mistake: Mistake, scene: Scenario, times: tuple[float, ...]) -> Array:
     from scipy.integrate import solve_ivp
 
-    def rates(_: float, state: Array) -> Array:
-        return mistake.rates(scene, state)
-
-    states = solve_ivp(rates, (0.0, times[-1]), scene.initial_state, "DOP853", times, rtol=ACCURACY, atol=ACCURACY).y.T
+    rates, span = lambda _, state: mistake.rates(scene, state), (0.0, times[-1])
+    states = solve_ivp(rates, span, scene.initial_state, "DOP853", times, rtol=ACCURACY, atol=ACCURACY).y.T
     states[:, ORIENTATION] /= np.linalg.norm(states[:, ORIENTATION], axis=1, keepdims=True)
     return np.asarray(states)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.faults.conventions import CONVENTIONS
-from dropspin.comparisons.faults.fault_model import unchanged_scene
+from dropspin.comparisons.faults.fault_model import unchanged
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth
 from dropspin.scenarios.rotations import angle_between_orientations
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
@@ -105,7 +105,7 @@ def _of_states(scene: Scenario, truth: Truth | None, motion: Trajectory) -> Iter
     dt, lag = float(motion.t[1] - motion.t[0]), abs(motion.velocity_lag)
     plain = _difference(scene, found, exact)
     if plain > GROSS:
-        read = [fault for fault in CONVENTIONS if fault.simulated is unchanged_scene]
+        read = [fault for fault in CONVENTIONS if fault.simulated is unchanged]
         left = [_difference(scene, found, fault.reported(exact)) for fault in read]
         if min(left) <= EXPLAINED * plain:
             yield f"{read[int(np.argmin(left))].message}; convert the states"

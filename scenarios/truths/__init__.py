@@ -76,6 +76,13 @@ def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
     return next(filter(None, (problem(scene, floor) for problem in ON_FLOOR)), None)
 
 
+def exact_solution(scene: Scenario) -> Truth:
+    """The exact solution of a scene that has one."""
+    truth = truth_for(scene)
+    assert truth is not None, scene.name
+    return truth
+
+
 def reference_for(scene: Scenario) -> Truth | None:
     """Return the motion with which motions of a scene are compared: its exact solution, or the first toss of its recording.
 

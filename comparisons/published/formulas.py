@@ -3,29 +3,24 @@
 import csv
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
 
-from dropspin.comparisons.published.results import EXACT, Agreement, Result, Status, agreement
+from dropspin.comparisons.published.results import EXACT, Agreement, Result, agreement
 from dropspin.comparisons.published.sources import DATA, Source
-from dropspin.scenarios import Scenario, Truth, load, truth_for
+from dropspin.scenarios import Scenario, Truth, load
 from dropspin.scenarios.mechanics import kinetic_energy
 from dropspin.scenarios.rotations import about, conjugate, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, Array
 from dropspin.scenarios.trajectory import Trajectory
+from dropspin.scenarios.truths import exact_solution
 
 RATES = ("roll", "pitch", "yaw")
 DECIMALS = 12
 """Decimals to which formulas are compared, and of exact rates [deg/s]: measured rounding errors of both are below 3e-14."""
 EPSILON = float(np.finfo(np.float64).eps)
-
-
-def truth_of(scene: Scenario) -> Truth:
-    """The exact solution of a scene that has one."""
-    truth = truth_for(scene)
-    assert truth is not None, scene.name
-    return truth
 
 
 def body_rates(states: Array) -> Array:
@@ -35,7 +30,7 @@ def body_rates(states: Array) -> Array:
 
 def nesc_brick(source: Source) -> Iterator[Result]:
     """The rates of each tool beside the exact ones: its largest error, and for tools that agree with each other, their common decimals."""
-    exact = truth_of(source.scene("brick"))
+    exact = exact_solution(source.scene("brick"))
     decimals = source.parameters["decimals"]
     with (DATA / source.parameters["rates"]).open(encoding="utf-8", newline="") as file:
         table = [(tool, list(rows)) for tool, rows in groupby(csv.DictReader(file), lambda row: row["tool"])]
@@ -48,16 +43,19 @@ def nesc_brick(source: Source) -> Iterator[Result]:
             equal = int(sum(f"{a:.{decimals}f}" == f"{b:.{decimals}f}" for a, b in zip(printed.flat, rates.flat, strict=True)))
             yield _count(source, name, f"{printed.size} rates, {decimals} decimals", printed.size, equal)
         worst, rate = np.unravel_index(np.argmax(np.abs(printed - rates)), printed.shape)
-        text = rows[worst][RATES[rate]]
         quantity = f"{RATES[rate]}, {times[worst]:.0f} s [deg/s]"
-        error = Agreement(f"{rates[worst, rate]:.{DECIMALS}f}", float(printed[worst, rate] - rates[worst, rate]), agrees=False)
-        yield _beside_exact(source, name, quantity, text, error, is_claimed=False)
+        yield _error(source, name, quantity, rows[worst][RATES[rate]], float(rates[worst, rate]))
 
 
-def _beside_exact(source: Source, tool: str, quantity: str, published: str, match: Agreement, *, is_claimed: bool = True) -> Result:
-    """A published value beside the exact one; of one that is not claimed to be exact, its error."""
-    status: Status = match.status if is_claimed else "error of the source"
-    return Result(source.name, tool, quantity, published, match.here, EXACT, status, difference=match.difference)
+def _beside_exact(source: Source, tool: str, quantity: str, published: str, match: Agreement) -> Result:
+    """A published value that is claimed to be exact beside the exact one."""
+    return Result(source.name, tool, quantity, published, match.here, EXACT, match.status, difference=match.difference)
+
+
+def _error(source: Source, tool: str, quantity: str, published: str, exact: float, decimals: int = DECIMALS) -> Result:
+    """The error of a published value that is not claimed to be exact."""
+    here, error = f"{exact:.{decimals}f}", float(published) - exact
+    return Result(source.name, tool, quantity, published, here, EXACT, "error of the source", difference=error)
 
 
 def _count(source: Source, tool: str, quantity: str, published: int, here: int) -> Result:
@@ -75,7 +73,7 @@ def _digits(source: Source, tool: str, quantity: str, published: float, here: fl
 def kane_free_body(source: Source) -> Iterator[Result]:
     """Kane's solution of the axisymmetric body, and the simple rotations with which Drake tests it."""
     scene = source.scene("cylinder")
-    truth = truth_of(scene)
+    truth = exact_solution(scene)
     *times, last = source.parameters["times"]
     for time in times:
         results = _kane_results(source, scene, truth, time)
@@ -125,7 +123,7 @@ def _simple_rotation(source: Source, scene: Scenario, axis: Sequence[float], rat
     """The largest error of the quaternion after a rotation about one axis, beside the bound of Drake's test."""
     direction = np.array(axis) / np.linalg.norm(axis)
     start = scene.start.model_copy(update={"angular_velocity": tuple((rate * direction).tolist())})
-    quaternion = truth_of(scene.model_copy(update={"start": start})).states(np.array([time]))[0, ORIENTATION]
+    quaternion = exact_solution(scene.model_copy(update={"start": start})).states(np.array([time]))[0, ORIENTATION]
     expected = about(direction, np.array([rate * time]))[0]
     error = float(min(np.abs(quaternion - expected).max(), np.abs(quaternion + expected).max()))
     bound = f"≤ {source.parameters['simple']['bound_in_epsilon'] * EPSILON:.2g}"
@@ -139,19 +137,17 @@ def housner_block(source: Source) -> Iterator[Result]:
     for slope in source.parameters["slopes"]:
         alpha = math.atan(slope)
         scene = rocking_scene(alpha, 0.5)
-        impact = truth_of(scene).events[0]
+        impact = exact_solution(scene).events[0]
         before, after = (Trajectory.from_states(np.zeros(1), state[None]) for state in (impact.before, impact.after))
         ratio = float((kinetic_energy(scene, after) / kinetic_energy(scene, before))[0])
         yield _digits(source, "restitution", f"r, tan α = {slope:g}", housner_ratio(alpha), ratio)
     for alpha, share, digits in source.parameters["periods"]:
         published = housner_period(share)
-        exact = 4.0 * truth_of(rocking_scene(alpha, share)).events[0].time
+        exact = 4.0 * exact_solution(rocking_scene(alpha, share)).events[0].time
         match = agreement(f"{published:.{digits}g}", exact, digits)
+        result = _beside_exact(source, "period", f"T [s], α = {alpha:g}, θ₀ = {share:g} α", f"{published:.{digits}g}", match)
         is_slender = alpha == source.parameters["slender"]
-        if not is_slender:
-            match = match._replace(difference=published - exact)
-        quantity = f"T [s], α = {alpha:g}, θ₀ = {share:g} α"
-        yield _beside_exact(source, "period", quantity, f"{published:.{digits}g}", match, is_claimed=is_slender)
+        yield result if is_slender else replace(result, status="error of the source", difference=published - exact)
 
 
 RADIUS, GRAVITY = 1.0, 9.81
@@ -188,14 +184,11 @@ def rocking_scene(alpha: float, share: float) -> Scenario:
 def bouncing_ball(source: Source) -> Iterator[Result]:
     """The heights that the source prints beside the exact bounces, and the time from which the ball lies still."""
     scene = source.scene("bounces")
-    truth = truth_of(scene)
+    truth = exact_solution(scene)
     for time, text in source.parameters["heights"].items():
         exact = float(truth.states(np.array([float(time)]))[0, POSITION][1]) - scene.body.resting_height
-        error = Agreement(f"{exact:.{DECIMALS}f}", float(text) - exact, agrees=False)
-        yield _beside_exact(source, "FMU", f"height at {time} s [m]", text, error, is_claimed=False)
-    text, exact = source.parameters["rests_from"], truth.events[-1].time
-    error = Agreement(f"{exact:.6f}", float(text) - exact, agrees=False)
-    yield _beside_exact(source, "FMU", "at rest from [s]", text, error, is_claimed=False)
+        yield _error(source, "FMU", f"height at {time} s [m]", text, exact)
+    yield _error(source, "FMU", "at rest from [s]", source.parameters["rests_from"], truth.events[-1].time, decimals=6)
 
 
 FORMULAS: Mapping[str, Callable[[Source], Iterator[Result]]] = {

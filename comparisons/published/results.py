@@ -2,11 +2,12 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Literal, NamedTuple
 
 from dropspin.comparisons.judging.verdicts import Verdict
+from dropspin.comparisons.running.recording import Breakdown
 
 Status = Literal["reproduced", "differs", "error of the source", "not reproducible", "for comparison", "not run"]
 """Reproduced: the digits are equal, or the value is within the bound or tolerance that the source states. Differs: they are not, although
@@ -43,6 +44,13 @@ class Result:
     reason: str = ""
     difference: float = math.nan
     verdict: Verdict | Literal[""] = ""
+
+
+def without_value(result: Result, breakdown: Breakdown, why_not: str) -> Result:
+    """The result of an engine that gave no value; `why_not` is why none can give it here, empty if one can."""
+    if why_not or breakdown.verdict == "declined":
+        return replace(result, status="not reproducible", reason=why_not or breakdown.reason)
+    return replace(result, reason=breakdown.reason, verdict=breakdown.verdict)
 
 
 BOUND = re.compile(r"([<>≤]) (.+)")

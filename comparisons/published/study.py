@@ -6,7 +6,7 @@ from dataclasses import replace
 from dropspin.comparisons.engines.packages import numbers_of
 from dropspin.comparisons.published.formulas import FORMULAS
 from dropspin.comparisons.published.quantities import quantity
-from dropspin.comparisons.published.results import ABSENT, SHOWN, Result, agreement
+from dropspin.comparisons.published.results import ABSENT, SHOWN, Result, agreement, without_value
 from dropspin.comparisons.published.sources import Case, Group, Source, sources
 from dropspin.comparisons.published.tosses import acosta_cube
 from dropspin.comparisons.running.entries import engine_entry
@@ -83,10 +83,7 @@ def _of_case(source: Source, group: Group, case: Case, measured: list[float] | B
     for name, printed, value in zip(group.quantities, case.printed, values, strict=True):
         result = Result(source.name, group.tool, f"{case.case}: {name}" if case.case else name, printed, "", group.by, "not run")
         if isinstance(value, Breakdown):
-            if group.why_not or value.verdict == "declined":
-                yield replace(result, status="not reproducible", reason=group.why_not or value.reason)
-            else:
-                yield replace(result, reason=value.reason, verdict=value.verdict)
+            yield without_value(result, value, group.why_not)
         elif printed == ABSENT:
             yield replace(result, here=f"{value:.{SHOWN}g}", status="for comparison")
         else:

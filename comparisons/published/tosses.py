@@ -7,12 +7,13 @@ import io
 import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.published.results import SHOWN, Result, agreement
+from dropspin.comparisons.published.results import SHOWN, Result, agreement, without_value
 from dropspin.comparisons.published.sources import Source
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
@@ -20,7 +21,7 @@ from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.files import read_file
-from dropspin.scenarios.rotations import angle_between_orientations, length, rotate, rotation_vector, unrotate
+from dropspin.scenarios.rotations import angle_between_orientations, length, rotate, rotation_vector
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 
 COLUMNS = 19
@@ -103,15 +104,14 @@ def acosta_cube(source: Source, folder: str, processes: EngineProcesses) -> Iter
 
 
 def _result(name: str, run: Run, quantity: str, printed: str, value: float | Breakdown) -> Result:
-    label, why_not = f"{run['case']}: {quantity}", run.get("why_not", "")
+    result, why_not = Result(name, run["tool"], f"{run['case']}: {quantity}", printed, "", run["by"], "not run"), run.get("why_not", "")
     if isinstance(value, Breakdown):
-        if why_not:
-            return Result(name, run["tool"], label, printed, "", run["by"], "not reproducible", why_not)
-        return Result(name, run["tool"], label, printed, "", run["by"], "not run", value.reason, verdict=value.verdict)
+        return without_value(result, value, why_not)
     match = agreement(printed, value)
     if why_not:
-        return Result(name, run["tool"], label, printed, f"{value:.{SHOWN}g}", run["by"], "not reproducible", why_not, match.difference)
-    return Result(name, run["tool"], label, printed, match.here, run["by"], match.status, difference=match.difference)
+        here = f"{value:.{SHOWN}g}"
+        return replace(result, here=here, status="not reproducible", reason=why_not, difference=match.difference)
+    return replace(result, here=match.here, status=match.status, difference=match.difference)
 
 
 def _simulated(entry: EngineEntry, cube: Cube, run: Run, tosses: list[Array]) -> dict[str, float]:
@@ -149,12 +149,8 @@ def _pybullet(cube: Cube, run: Run, tosses: list[Array]) -> list[Array]:
             server.setTimeStep(1.0 / (cube["rate"] * cube["substeps"]))
             server.resetBasePositionAndOrientation(body, toss[0, POSITION], toss[0, ORIENTATION])
             server.resetBaseVelocity(body, toss[0, VELOCITY], toss[0, SPIN])
-            rows = []
-            for _ in toss:
-                rows.append(np.concatenate(server.getBasePositionAndOrientation(body)))
-                for _ in range(cube["substeps"]):
-                    server.stepSimulation()
-            poses.append(np.array(rows))
+            parts = [server.states_after_each(body, steps, count) for steps, count in ((0, 1), (cube["substeps"], len(toss) - 1))]
+            poses.append(np.concatenate(parts)[:, :7])
     return poses
 
 
@@ -162,12 +158,13 @@ def _mujoco(cube: Cube, run: Run, tosses: list[Array]) -> list[Array]:
     """Poses [position, x, y, z, w] of every frame."""
     import mujoco
 
+    from dropspin.comparisons.engines.mujoco_simulation import from_world
+
     model = mujoco.MjModel.from_xml_string(MJCF.format(**cube, **run, dt=1.0 / (cube["rate"] * cube["substeps"])))
     data, poses = mujoco.MjData(model), []
     for toss in tosses:
         mujoco.mj_resetData(model, data)
-        data.qpos[:] = np.concatenate([toss[0, POSITION], np.roll(toss[0, ORIENTATION], 1)])
-        data.qvel[:] = np.concatenate([toss[0, VELOCITY], unrotate(toss[0, ORIENTATION], toss[0, SPIN])])
+        data.qpos[:], data.qvel[:] = np.split(from_world(toss[0]), [7])
         rows = np.empty((len(toss), 7))
         for row in rows:
             row[:] = data.qpos

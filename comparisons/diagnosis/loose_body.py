@@ -12,7 +12,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.parts import AXES, DIRECTIONS, Part, Support, volume
+from dropspin.comparisons.diagnosis.parts import AXES, DIRECTIONS, VOLUMES, Part, Support
 from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.rotations import rotate
@@ -154,7 +154,7 @@ class Facts:
     def solid(self) -> Array | None:
         """The inertia about the centre of mass if the mass were spread evenly over the geometries [kg m²], shape (3, 3)."""
         parts = self.colliding
-        volumes = [volume(part.shape) for part in parts]
+        volumes = [VOLUMES[part.shape.shape](part.shape) for part in parts]
         if not parts or not min(volumes) > 0.0:
             return None
         centre = np.average([part.position for part in parts], axis=0, weights=volumes)

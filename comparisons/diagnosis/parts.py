@@ -1,12 +1,12 @@
 """The geometries of a body: solid shapes, their lowest points and volumes."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Mesh, Shape, Sphere, body_of
+from dropspin.scenarios.bodies import Shape, body_of
 from dropspin.scenarios.bodies.hull import hull_corners
 from dropspin.scenarios.bodies.mesh import is_closed
 from dropspin.scenarios.bodies.mesh_files import Faces
@@ -19,6 +19,15 @@ HEIGHTS = 1.0 - 2.0 * (np.arange(150) + 0.5) / 150
 AROUND = np.sqrt(1.0 - HEIGHTS**2)
 DIRECTIONS = np.concatenate([np.stack([AROUND * np.cos(TURNS), HEIGHTS, AROUND * np.sin(TURNS)], axis=1), AXES, -AXES])
 """Directions that are spread evenly, and those of the axes, shape (156, 3)."""
+VOLUMES: dict[str, Callable[[Any], float]] = {
+    "sphere": lambda ball: 4.0 / 3.0 * math.pi * ball.radius**3,
+    "cylinder": lambda rod: 2.0 * math.pi * rod.radius**2 * rod.half_length,
+    "capsule": lambda rod: 2.0 * math.pi * rod.radius**2 * rod.half_length + 4.0 / 3.0 * math.pi * rod.radius**3,
+    "box": lambda box: 8.0 * math.prod(box.half_extents),
+    "ellipsoid": lambda ball: 4.0 / 3.0 * math.pi * math.prod(ball.half_extents),
+    "mesh": lambda mesh: abs(mesh.content) if mesh.inertia == "solid" else math.nan,
+}
+"""The volume of a shape [m³], by its kind; NaN of a mesh that is not closed."""
 
 
 class Part(NamedTuple):
@@ -62,20 +71,6 @@ def at_point(states: Array, arm: Array) -> Array:
     found[..., POSITION] += arms
     found[..., VELOCITY] += cross(states[..., SPIN], arms)
     return found
-
-
-def volume(shape: Shape) -> float:
-    """Volume of a shape [m³]; NaN of a mesh that is not closed."""
-    if isinstance(shape, Sphere):
-        return 4.0 / 3.0 * math.pi * shape.radius**3
-    if isinstance(shape, Cylinder | Capsule):
-        caps = 4.0 / 3.0 * math.pi * shape.radius**3 if isinstance(shape, Capsule) else 0.0
-        return 2.0 * math.pi * shape.radius**2 * shape.half_length + caps
-    if isinstance(shape, Box | Ellipsoid):
-        return (8.0 if isinstance(shape, Box) else 4.0 / 3.0 * math.pi) * math.prod(shape.half_extents)
-    if isinstance(shape, Mesh) and shape.inertia == "solid":
-        return abs(shape.content)
-    return math.nan
 
 
 def solid(shape: str, **sizes: Any) -> Shape:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 from dropspin.comparisons.engines.packages import numbers_of
 from dropspin.comparisons.published.formulas import FORMULAS
@@ -11,11 +12,9 @@ from dropspin.comparisons.published.sources import Case, Group, Source, sources
 from dropspin.comparisons.published.tosses import acosta_cube
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown, finite, try_record
 from dropspin.scenarios import DropspinError, Scenario
-
-RESOURCES = ResourceLimits(processor_time=60.0)
 
 
 def reproduce(
@@ -23,7 +22,7 @@ def reproduce(
     *,
     data: str | None = None,
     on_progress: Callable[[str, float], None] | None = None,
-    resources: ResourceLimits = RESOURCES,
+    resources: ResourceLimits = ONE_MINUTE,
 ) -> list[Result]:
     """Run what published sources describe, and compare the values with the digits that they print.
 
@@ -44,27 +43,25 @@ def reproduce(
     for source in chosen:
         if source.data and data is None:
             raise DropspinError(f"{source.name}: needs {source.data}; give the folder: dropspin reproduce {source.name} DIR.")
-    total = sum(1 + len(source.parameters.get("runs", ())) + sum(len(group.cases) for group in source.groups) for source in chosen)
     results: list[Result] = []
-    done = 0
     with EngineProcesses(resources) as processes:
-        for source in chosen:
-            callback(source.name, done / total)
-            results += FORMULAS[source.formula](source) if source.formula else []
-            done += 1
-            if source.data and data is not None:
-                for of_run in acosta_cube(source, data, processes):
-                    results += of_run
-                    done += 1
-                    callback(source.name, done / total)
-            for group in source.groups:
-                entry = engine_entry(group.by) if group.by else EngineEntry("", None, "missing", group.why_not)
-                for case in group.cases:
-                    callback(f"{source.name}, {entry.label}", done / total)
-                    measured = processes.call(entry, _measured, source.scene(group.scene), case.dt, group.quantities, group.since)
-                    results += _of_case(source, group, case, measured)
-                    done += 1
+        pieces = [piece for source in chosen for piece in _pieces(source, data, processes)]
+        for number, (what, work) in enumerate(pieces):
+            callback(what, number / len(pieces))
+            results += work()
     return results
+
+
+def _pieces(source: Source, data: str | None, processes: EngineProcesses) -> Iterator[tuple[str, Callable[[], Iterable[Result]]]]:
+    """The pieces of work of a source, each with its name: its formula, each run of the tosses, and each case of an engine."""
+    if source.formula:
+        yield source.name, partial(FORMULAS[source.formula], source)
+    if source.data and data is not None:
+        yield from ((source.name, work) for work in acosta_cube(source, data, processes))
+    for group in source.groups:
+        entry = engine_entry(group.by) if group.by else EngineEntry("", None, "missing", group.why_not)
+        for case in group.cases:
+            yield f"{source.name}, {entry.label}", partial(_of_case, source, group, case, entry, processes)
 
 
 def _measured(entry: EngineEntry, scene: Scenario, dt: float, names: Sequence[str], since: str) -> list[float]:
@@ -77,8 +74,9 @@ def _measured(entry: EngineEntry, scene: Scenario, dt: float, names: Sequence[st
     return [quantity(name)(scene, motion) for name in names]
 
 
-def _of_case(source: Source, group: Group, case: Case, measured: list[float] | Breakdown) -> Iterator[Result]:
+def _of_case(source: Source, group: Group, case: Case, entry: EngineEntry, processes: EngineProcesses) -> Iterator[Result]:
     """The results of one run."""
+    measured = processes.call(entry, _measured, source.scene(group.scene), case.dt, group.quantities, group.since)
     values: Sequence[float | Breakdown] = [measured] * len(case.printed) if isinstance(measured, Breakdown) else measured
     for name, printed, value in zip(group.quantities, case.printed, values, strict=True):
         result = Result(source.name, group.tool, f"{case.case}: {name}" if case.case else name, printed, "", group.by, "not run")

@@ -8,6 +8,7 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -90,28 +91,25 @@ def errors(poses: list[Array], tosses: list[Array], half_side: float) -> dict[st
     }
 
 
-def acosta_cube(source: Source, folder: str, processes: EngineProcesses) -> Iterator[list[Result]]:
-    """The published errors beside those of the same runs here, run by run."""
-    cube = source.parameters["cube"]
-    tosses = read_tosses(Path(folder), cube)
-    for run in source.parameters["runs"]:
-        entry = engine_entry(run["by"]) if run["by"] else EngineEntry("", None, "missing", run["why_not"])
-        values = processes.call(entry, _simulated, cube, run, tosses)
-        yield [
-            _result(source.name, run, quantity, printed, values if isinstance(values, Breakdown) else values[quantity])
-            for quantity, printed in run["printed"].items()
-        ]
+def acosta_cube(source: Source, folder: str, processes: EngineProcesses) -> list[Callable[[], Iterator[Result]]]:
+    """Functions that give the published errors beside those of the same runs here, run by run."""
+    tosses = read_tosses(Path(folder), source.parameters["cube"])
+    return [partial(_of_run, source, run, tosses, processes) for run in source.parameters["runs"]]
 
 
-def _result(name: str, run: Run, quantity: str, printed: str, value: float | Breakdown) -> Result:
-    result, why_not = Result(name, run["tool"], f"{run['case']}: {quantity}", printed, "", run["by"], "not run"), run.get("why_not", "")
-    if isinstance(value, Breakdown):
-        return without_value(result, value, why_not)
-    match = agreement(printed, value)
-    if why_not:
-        here = f"{value:.{SHOWN}g}"
-        return replace(result, here=here, status="not reproducible", reason=why_not, difference=match.difference)
-    return replace(result, here=match.here, status=match.status, difference=match.difference)
+def _of_run(source: Source, run: Run, tosses: list[Array], processes: EngineProcesses) -> Iterator[Result]:
+    why_not = run.get("why_not", "")
+    entry = engine_entry(run["by"]) if run["by"] else EngineEntry("", None, "missing", why_not)
+    values = processes.call(entry, _simulated, source.parameters["cube"], run, tosses)
+    for quantity, printed in run["printed"].items():
+        result = Result(source.name, run["tool"], f"{run['case']}: {quantity}", printed, "", run["by"], "not run")
+        if isinstance(values, Breakdown):
+            yield without_value(result, values, why_not)
+            continue
+        match = agreement(printed, values[quantity])
+        result = replace(result, here=match.here, status=match.status, difference=match.difference)
+        here = f"{values[quantity]:.{SHOWN}g}"
+        yield replace(result, here=here, status="not reproducible", reason=why_not) if why_not else result
 
 
 def _simulated(entry: EngineEntry, cube: Cube, run: Run, tosses: list[Array]) -> dict[str, float]:

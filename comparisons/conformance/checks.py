@@ -12,7 +12,7 @@ from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.engines.base import Diverged, Engine
 from dropspin.comparisons.running.entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios.errors import verify_known
 
@@ -42,7 +42,7 @@ def conform(
     engine: Engine | str,
     checks: Sequence[str] = (),
     *,
-    resources: ResourceLimits = ResourceLimits(processor_time=60.0),  # noqa: B008 - it is immutable
+    resources: ResourceLimits = ONE_MINUTE,
     on_result: Callable[[CheckResult], None] | None = None,
 ) -> list[CheckResult]:
     """Check an adapter against the protocol, and its motions against reference motions.

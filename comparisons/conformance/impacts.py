@@ -86,10 +86,6 @@ class Contact(NamedTuple):
         """u, the velocity of the contact point [m/s]."""
         return self.velocities[:3] + np.cross(self.velocities[3:], self.point)
 
-    def response(self, inverse: Array) -> Array:
-        """K of eq 15."""
-        return response_of(self.point, self.mass, inverse)
-
     def after(self, impulse: Array, inverse: Array) -> Array:
         """The velocities after an impulse, shape (6,)."""
         return self.velocities + np.concatenate([impulse / self.mass, inverse @ np.cross(self.point, impulse)])
@@ -140,12 +136,12 @@ def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:
 def _predictions(contact: Contact) -> Iterator[tuple[str, Array]]:
     """Mistakes, and the velocities after an impact with each, shape (6,); the rule of the lecture note's laboratory is the first."""
     right = INVERSES[""](contact.axes, contact.inertia)
-    for message, impulse in _impulses(contact, contact.response(right)):
+    for message, impulse in _impulses(contact, response_of(contact.point, contact.mass, right)):
         yield message, contact.after(impulse, right)
     for (in_response, of_response), (in_turn, of_turn) in product(INVERSES.items(), repeat=2):
         if in_response or in_turn:
             inverses = [inverse(contact.axes, contact.inertia) for inverse in (of_response, of_turn)]
-            for message, impulse in _impulses(contact, contact.response(inverses[0])):
+            for message, impulse in _impulses(contact, response_of(contact.point, contact.mass, inverses[0])):
                 if message == BY_SLIP:
                     yield "; and ".join(dict.fromkeys(filter(None, (in_response, in_turn)))), contact.after(impulse, inverses[1])
 

@@ -4,12 +4,12 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
 from threading import Event
 from typing import Any
 
+from dropspin.comparisons.engines import registry
 from dropspin.comparisons.engines.adapter_code import built_in_code
 from dropspin.comparisons.engines.registry import BUILT_IN
 from dropspin.comparisons.record.environments import measured, prereleases, releases
@@ -112,7 +112,4 @@ def _measured(plan: Plan, time_limit: float, stopping: Event | None, asked: tupl
 
 def _code(engine: str) -> str:
     """The hash of an adapter's code, whose engine need not be installed here."""
-    spec = find_spec(BUILT_IN[engine].module)
-    assert spec is not None
-    assert spec.origin is not None
-    return built_in_code(Path(spec.origin))
+    return built_in_code(Path(registry.__file__).with_name(f"{BUILT_IN[engine].module.rpartition('.')[2]}.py"))

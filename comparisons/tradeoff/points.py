@@ -118,11 +118,8 @@ class TradeOff:
     @property
     def undecided(self) -> list[CostPoint]:
         """The configurations that are on the Pareto front or not, depending on which of the rounds' costs is taken; cheapest first."""
-
-        def front_at(share: float) -> frozenset[CostPoint]:
-            return frozenset(_pareto_front(self.points, lambda point: float(np.quantile(point.cost, share))))
-
-        fronts = [front_at(share) for share in (0.0, 0.5, 0.75)]
+        costs = [lambda point, share=share: float(np.quantile(point.cost, share)) for share in (0.0, 0.5, 0.75)]
+        fronts = [frozenset(_pareto_front(self.points, cost)) for cost in costs]
         differing = frozenset().union(*fronts) - fronts[0].intersection(*fronts)
         return sorted(differing, key=lambda point: point.typical_cost)
 

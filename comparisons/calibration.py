@@ -13,7 +13,7 @@ import numpy as np
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.running.entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry, verify_time_step
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import FIVE_MINUTES, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown, verify_accepted
 from dropspin.comparisons.running.start_phases import START_PHASES
 from dropspin.comparisons.running.verification import verified_settings
@@ -82,7 +82,7 @@ def calibrate(
     friction: str | float = "none",
     shape: Shape = "ball",
     *,
-    resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
+    resources: ResourceLimits = FIVE_MINUTES,
 ) -> Calibration:
     """Compute the settings that give a coefficient of restitution at a time step, and measure their effect.
 

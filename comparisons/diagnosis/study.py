@@ -19,12 +19,11 @@ from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.comparisons.running.entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.bodies.mesh_files import read_mesh
 
-RESOURCES = ResourceLimits(processor_time=60.0)
 READERS = {".xml": ("mujoco",), ".mjcf": ("mujoco",), ".urdf": ("mujoco", "pybullet"), ".obj": ("mujoco",), ".stl": ("mujoco",)}
 """The engines that read a file, by its ending."""
 MESH = """<mujoco><asset><mesh name="mesh" file="{path}"/></asset><worldbody><geom type="plane" size="0 0 1"/>
@@ -114,7 +113,7 @@ def diagnose(
     density: float = 1000.0,
     restitution: float | None = None,
     friction: float | None = None,
-    resources: ResourceLimits = RESOURCES,
+    resources: ResourceLimits = ONE_MINUTE,
     jobs: int | None = None,
     on_progress: Callable[[str, float], None] | None = None,
 ) -> Diagnosis:

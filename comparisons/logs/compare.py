@@ -35,7 +35,7 @@ from dropspin.comparisons.logs.replay import (
 )
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import FIVE_MINUTES, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.state import Array
@@ -135,7 +135,7 @@ def log_compare(
     fit: LogFit | None = None,
     *,
     on_progress: Callable[[str, float], None] | None = None,
-    resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
+    resources: ResourceLimits = FIVE_MINUTES,
     jobs: int | None = None,
 ) -> LogComparison:
     """Compare engines with the tosses of a recording.

@@ -16,7 +16,7 @@ from dropspin.comparisons.logs.intervals import LEVEL, expanded
 from dropspin.comparisons.logs.log import Log
 from dropspin.comparisons.logs.replay import flights_in, of_each_engine
 from dropspin.comparisons.running.entries import engine_entries
-from dropspin.comparisons.running.processes import ResourceLimits
+from dropspin.comparisons.running.processes import FIVE_MINUTES, ResourceLimits
 
 ANY_ENGINE = "any engine"
 ENGINES = ("mujoco", "wang[contact=sequential,law=coulomb]")
@@ -102,7 +102,7 @@ def log_fit(
     frames: int = FRAMES,
     *,
     on_progress: Callable[[str, float], None] | None = None,
-    resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
+    resources: ResourceLimits = FIVE_MINUTES,
     jobs: int | None = None,
 ) -> LogFit:
     """Estimate the friction and the restitution of the floor that engines need to continue the tosses of a recording.

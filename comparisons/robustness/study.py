@@ -20,7 +20,7 @@ from dropspin.comparisons.robustness.runner import MOST_STEPS_PER_START, Runner
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry, SceneLike, as_scene, ignore, verify_time_step
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses, ResourceLimits
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.errors import verify_known
 
@@ -37,7 +37,6 @@ SCENES = ("spin-principal", "spin-asymmetric", "drop-ball-lively", "drop-box-fla
 """A rotation that every method reproduces, one that few reproduce, a ball and a box that bounce, and a block that comes to rest."""
 DT = 5e-3  # s
 WITHIN = 0.1
-RESOURCES = ResourceLimits(processor_time=60.0)
 ACCURATE, STABLE = ("sound",), ("sound", "inaccurate")
 
 NEAR = 1.03
@@ -138,7 +137,7 @@ def find_limits(
     dt: float = DT,
     within: float = WITHIN,
     on_progress: Callable[[str, float], None] | None = None,
-    resources: ResourceLimits = RESOURCES,
+    resources: ResourceLimits = ONE_MINUTE,
     jobs: int | None = None,
 ) -> RobustnessStudy:
     """Vary one quantity of a scene at a time, up to extreme values, and find the failure modes of engines.

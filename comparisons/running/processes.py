@@ -64,6 +64,10 @@ class ResourceLimits:
                 raise DropspinError(f"{name}: got {value:g}; give a number above 0 and at most {most:g}.")
 
 
+ONE_MINUTE, FIVE_MINUTES = ResourceLimits(processor_time=60.0), ResourceLimits()
+"""The defaults: for a few simulations, and for a scene with all start phases."""
+
+
 class Closed(Exception):
     """Another thread has abandoned this work."""
 

@@ -18,7 +18,7 @@ from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.forecast import Forecast, forecast
 from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, as_scenes, ignore, several, verify_time_step
 from dropspin.comparisons.running.parallel import started_crews, work_in_parallel
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import FIVE_MINUTES, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.progress import OnProgress, Progress
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.running.scene_run import Timings, run_scene
@@ -35,7 +35,7 @@ def run(
     dt: float | Iterable[float] = DEFAULT_DTS,
     *,
     on_progress: OnProgress | None = None,
-    resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
+    resources: ResourceLimits = FIVE_MINUTES,
     keep: Callable[[Results], None] | None = None,
     done: Iterable[Results] = (),
     jobs: int | None = None,

@@ -12,7 +12,7 @@ from typing import Any
 from dropspin.comparisons.running.cluster import connected
 from dropspin.comparisons.running.inputs import ignore
 from dropspin.comparisons.running.parallel import as_done, started_crews, work_in_parallel
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses, ResourceLimits
 from dropspin.comparisons.sweeps.folder import SweepFolder
 from dropspin.comparisons.sweeps.jobs import Sweep
 from dropspin.comparisons.sweeps.work import Work, installed_versions
@@ -29,7 +29,7 @@ def run_sweep(
     *,
     resume: bool = False,
     scheduler: str | None = None,
-    resources: ResourceLimits = ResourceLimits(processor_time=60.0),  # noqa: B008 - it is immutable
+    resources: ResourceLimits = ONE_MINUTE,
     on_progress: Callable[[int], None] | None = None,
 ) -> None:
     """Run the jobs of a sweep that a folder does not have yet.

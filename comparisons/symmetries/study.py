@@ -16,7 +16,7 @@ from dropspin.comparisons.measuring.tolerances import perturbed
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scenes, ignore, verify_time_step
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown, classify, finite, record_batch, try_record
 from dropspin.comparisons.symmetries.findings import Effects, Finding, Pairs, judged, not_run
 from dropspin.reference_impl.threads import usable_cores
@@ -28,7 +28,6 @@ SCENES = ("spin-asymmetric", "drop-ball-backspin", "drop-box-anyhow", "drop-box-
 """A free rotation, a ball with backspin, boxes that strike a smooth and a rough floor, a rolling ball, a sliding and a turning box."""
 ENGINES = ("wang", "mujoco", "pybullet")
 DT = 1e-3  # s
-RESOURCES = ResourceLimits(processor_time=60.0)
 FASTER = (1.001, 1.002)
 """Factors on the initial velocities of the other simulations of a batch, which also start as many thousandths of the body's size away.
 
@@ -42,7 +41,7 @@ def symmetries(
     *,
     dt: float = DT,
     on_progress: Callable[[str, float], None] | None = None,
-    resources: ResourceLimits = RESOURCES,
+    resources: ResourceLimits = ONE_MINUTE,
     jobs: int | None = None,
 ) -> list[Finding]:
     """Run scenes and scenes that have the same motion, and compare the motions.

@@ -19,10 +19,10 @@ from dropspin.comparisons.measuring.motions import Motions
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scenes, ignore, verify_time_step
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.symmetries.findings import Finding, Status, judged
-from dropspin.comparisons.symmetries.study import DT, RESOURCES, effects_of_rounding, states_of
+from dropspin.comparisons.symmetries.study import DT, effects_of_rounding, states_of
 from dropspin.scenarios import DropspinError, Scenario, Trajectory
 from dropspin.scenarios.state import Array
 
@@ -67,7 +67,7 @@ def twins(
     *,
     dt: float = DT,
     on_progress: Callable[[str, float], None] | None = None,
-    resources: ResourceLimits = RESOURCES,
+    resources: ResourceLimits = ONE_MINUTE,
     jobs: int | None = None,
 ) -> list[TwinFinding]:
     """Run scenes with engines that should give the same motions, and compare these pair by pair.

@@ -17,7 +17,7 @@ from dropspin.comparisons.measuring.metrics import leading_metric, metrics_for
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore
 from dropspin.comparisons.running.parallel import as_jobs, results_in_parallel
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import FIVE_MINUTES, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.tradeoff.costs import WORLDS, cost, costs_per_world, load, memory_per_world
 from dropspin.comparisons.tradeoff.errors import BUDGET, Ladder, errors_over_steps
@@ -58,7 +58,7 @@ def tradeoff(
     budget: float = BUDGET,
     worlds: Sequence[int] = WORLDS,
     on_progress: OnProgress | None = None,
-    resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
+    resources: ResourceLimits = FIVE_MINUTES,
     jobs: int | None = None,
 ) -> TradeOff:
     """Measure error and cost of engines over a ladder of time steps.

@@ -15,7 +15,7 @@ from support.cli import Started, dropspin, spawn
 
 import dropspin as ds
 from dropspin.comparisons.robustness import study
-from dropspin.comparisons.running.processes import ResourceLimits
+from dropspin.comparisons.running.processes import FIVE_MINUTES, ONE_MINUTE
 from dropspin.reports.commands import main as cli
 from dropspin.reports.commands.limits import limits_command
 from dropspin.reports.commands.run import run_command
@@ -221,6 +221,6 @@ def test_defaults_of_options_are_those_of_the_library():
     """Options state their defaults as numbers, because `--help` imports no library."""
     limits = {option.name: option.default for option in limits_command.params}
     run = {option.name: option for option in run_command.params}
-    assert (limits["dt"], limits["within"], limits["resources"]) == (study.DT, study.WITHIN, study.RESOURCES.processor_time)
-    assert run["resources"].default == ResourceLimits().processor_time
+    assert (limits["dt"], limits["within"], limits["resources"]) == (study.DT, study.WITHIN, ONE_MINUTE.processor_time)
+    assert run["resources"].default == FIVE_MINUTES.processor_time
     assert run["dts"].help.endswith(f"[default: {', '.join(map(str, ds.DEFAULT_DTS))}]")

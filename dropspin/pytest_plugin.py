@@ -23,7 +23,7 @@ from typing import Any
 import pytest
 
 NAME = "dropspin"
-BREAKDOWNS = frozenset({"diverged", "crashed", "timed_out"})
+BREAKDOWNS = frozenset({"broken", "diverged", "crashed", "timed_out"})
 FAILING = BREAKDOWNS | {"failed"}
 STOPPED = BREAKDOWNS | {"declined", "missing"}
 BASELINE = "dropspin-baseline.toml"

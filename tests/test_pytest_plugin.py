@@ -36,8 +36,8 @@ def repository(pytester, monkeypatch):
 
 def test_marked_test_is_called_for_each_engine(repository):
     """It passes, fails, or is skipped by the verdicts; the messages, the commands and the summary say which."""
-    repository.makepyfile(absent="import no_such_engine", test_own=SCENE_TEST)
-    engines = [*options("Mine", "Faulty", "Dying", "Shy"), "--dropspin-engine", "absent:Engine"]
+    repository.makepyfile(absent="import no_such_engine", unfit="Engine = 1 / 0", test_own=SCENE_TEST)
+    engines = [*options("Mine", "Faulty", "Dying", "Shy"), "--dropspin-engine", "absent:Engine", "--dropspin-engine", "unfit:Engine"]
     done = repository.runpytest_inprocess("-rs", "-v", *engines)
     reasons = {one.metric: one.reason for one in scenarios.load("spin-principal").expect}
     done.stdout.fnmatch_lines(
@@ -47,9 +47,11 @@ def test_marked_test_is_called_for_each_engine(repository):
             "test_own.py::test_scene[[]spin-principal-engines:Dying] ERROR*",
             "test_own.py::test_scene[[]spin-principal-engines:Shy] SKIPPED*",
             "test_own.py::test_scene[[]spin-principal-absent:Engine] ERROR*",
+            "test_own.py::test_scene[[]spin-principal-unfit:Engine] ERROR*",
             "spin-principal, dying: crashed: its process was ended by SIGABRT",
             "Reproduce: dropspin run spin-principal -e engines:Dying --dt 0.004 -o out/again",
             "spin-principal, absent:Engine: missing: *no_such_engine, which is not installed.",
+            "spin-principal, unfit:Engine: broken: *division by zero*",
             "E * spin-principal, faulty: energy_error at 0.004 s is 0.002, expected -1e-06 … 1e-06",
             f"E *    {reasons['energy_error']}",
             "E *    Reproduce: dropspin run spin-principal -e engines:Faulty --dt 0.004 -o out/again",
@@ -65,10 +67,10 @@ def test_marked_test_is_called_for_each_engine(repository):
             "SKIPPED * shy declined: I do not spin",
         ],
     )
-    done.assert_outcomes(passed=1, failed=1, errors=2, skipped=1)
+    done.assert_outcomes(passed=1, failed=1, errors=3, skipped=1)
     assert "Traceback" not in done.stdout.str()
     folders = list(repository.path.glob(".pytest_cache/d/dropspin/spin-principal-*/"))
-    assert len(folders) == 5
+    assert len(folders) == 6
     assert all((folder / "report.html").is_file() for folder in folders)
     [accept] = re.findall(r"intended: dropspin (accept .*); then use", done.stdout.str())
     assert dropspin(*shlex.split(accept), cwd=repository.path).returncode == 0

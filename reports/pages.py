@@ -10,6 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from dropspin.comparisons.judging.verdicts import MARKS
 from dropspin.reports.plots.chart_data import chart_data
+from dropspin.reports.plots.colours import human_label
 from dropspin.reports.stories import numbers
 
 
@@ -29,7 +30,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "outcome", "formatted", "quantity", "duration")}
-    environment.filters["unbroken"] = _unbroken
+    environment.filters |= {"unbroken": _unbroken, "human": human_label}
     environment.filters |= {"chart_data": chart_data, "sha256": _base64_sha256}
     environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": MARKS}
     return environment

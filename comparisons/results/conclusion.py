@@ -13,7 +13,7 @@ from dropspin.scenarios import Scenario
 
 WITHIN = 0.01
 """The share of its scale that an error may have, unless another one is asked for."""
-QUESTIONS = ("energy_error", "bounce_height_error", "angular_momentum_error", "orientation_error", "position_error")
+QUESTIONS = ("orientation_error", "bounce_height_error", "energy_error", "angular_momentum_error", "position_error")
 """The metrics that a conclusion may be about, those that are named first where there are many."""
 ENOUGH = 3
 """Scenes that must test a question before an engine is recommended for it."""
@@ -34,7 +34,7 @@ class Answer:
         steps: The time steps [s] that were tried in each scene of `within`, smallest first.
         condition: What at least two scenes of `beyond`, and none of the others, have: of `CONDITIONS` the one that most have; or empty.
         named: The scenes of `beyond` that do not have it.
-        largest: The largest error of `beyond` at the finest time step, relative to its scale; NaN without one.
+        largest: The largest error of `beyond` at the finest time step, relative to its scale; NaN without one, and if the engine broke down.
         cost: Median of the computing time per simulated second, at `dt`; NaN if it was not measured.
     """
 
@@ -124,6 +124,6 @@ def _answer(metric: str, engine: str, scenes: int, series: pd.DataFrame, models:
         steps=tuple(common),
         condition=condition if covered else "",
         named=tuple(scene for scene in beyond if scene not in covered),
-        largest=float(finest.loc[finest["state"] == "beyond", "size"].max()),
+        largest=float(finest.loc[finest["state"] == "beyond", "size"].max(skipna=False)),
         cost=float(kept.loc[kept["dt"] == dt, "cost"].median()),
     )

@@ -13,7 +13,7 @@ import pandas as pd
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING, STUDIES
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, OUTCOMES, VERDICTS, Outcome, with_reason
 from dropspin.comparisons.measuring.metrics import leading_metric
-from dropspin.comparisons.measuring.tolerances import scale
+from dropspin.comparisons.measuring.tolerances import NEGLIGIBLE, scale
 from dropspin.comparisons.results.ensembles import EnsembleOutcome
 from dropspin.comparisons.results.provenance import digest
 from dropspin.comparisons.results.table import empty_table
@@ -228,9 +228,15 @@ def relative_sizes(rows: pd.DataFrame, scenes: Mapping[str, Scenario]) -> list[f
 
 
 def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
-    """Which rows are asymptotic errors whose interval contains 0 and values that are not negligible, so that no cause is stated."""
-    reach = rows[["lower", "upper"]].abs().max(axis=1)
-    return (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & (reach > SMALLEST_STATED)
+    """Which rows are asymptotic errors whose interval contains 0 and values that are not negligible, so that no cause is stated.
+
+    An error within rounding at the finest time step leaves no doubt, whatever it is at coarser ones.
+    """
+    of, reach = ["scene", "engine", "metric"], rows[["lower", "upper"]].abs().max(axis=1)
+    errors = rows[rows["kind"].isin(["truth", "invariant"])].sort_values("dt").drop_duplicates(of)
+    rounded = pd.MultiIndex.from_frame(errors.loc[errors["value"].abs() <= NEGLIGIBLE, of])
+    is_open = (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & (reach > SMALLEST_STATED)
+    return is_open & ~pd.MultiIndex.from_frame(rows[of]).isin(rounded)
 
 
 def _status(worst: str, of_model: bool = False, undecided: bool = False) -> Status:

@@ -4,10 +4,11 @@ import math
 from collections.abc import Sequence
 
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.comparisons.results.conclusion import ENOUGH, WITHIN, Answer, conclude
+from dropspin.comparisons.results.conclusion import CONDITIONS, ENOUGH, WITHIN, Answer, conclude
 from dropspin.comparisons.results.results import UNDECIDED, Results
+from dropspin.reports.plots.colours import human_label
 from dropspin.reports.stories.matrix import step_times
-from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, named, quantity
+from dropspin.reports.stories.numbers import duration, grouped, in_ms, named, quantity, short
 from dropspin.scenarios.text import counted
 
 MOST_QUESTIONS = 3
@@ -30,12 +31,25 @@ def conclusion(results: Results) -> list[str]:
     return [*(_statement(answers, within) for answers in list(questions.values())[:MOST_QUESTIONS]), none]
 
 
+def conditions(results: Results) -> dict[str, list[str]]:
+    """The scenes that have a property with which the conclusion excepts scenes, such as Coulomb friction."""
+    within = results.provenance["asked"].get("within") or WITHIN
+    excepted = dict.fromkeys(answer.condition for answer in conclude(results, within) if answer.condition and answer.is_recommended)
+    return {name: [scene for scene, model in results.scenes.items() if CONDITIONS[name](model)] for name in excepted}
+
+
 def _recommendation(answers: Sequence[Answer], within: float) -> str:
     """Which engines to use for a question that enough scenes test, the best first, and which not."""
     ordered = sorted(answers, key=lambda answer: (-len(answer.within), math.isnan(answer.cost), answer.cost))
-    used = [f"{answer.engine} {_steps(answer)}{_exceptions(answer)}{_absent(answer)}" for answer in ordered if answer.is_recommended]
+    used = [
+        f"{human_label(answer.engine)} {_steps(answer)}{_exceptions(answer)}{_absent(answer)}"
+        for answer in ordered
+        if answer.is_recommended
+    ]
     others = [
-        f"{answer.engine} (within it in {len(answer.within)} of {answer.scenes} scenes)" for answer in ordered if not answer.is_recommended
+        f"{human_label(answer.engine)}{_in_brackets(f'within it in {len(answer.within)} of {answer.scenes} scenes', _size(answer))}"
+        for answer in ordered
+        if not answer.is_recommended
     ]
     question, rest = f"For {_tolerance(answers[0].metric, within)}", ", ".join(others)
     if not used:
@@ -49,13 +63,13 @@ def _statement(answers: Sequence[Answer], within: float) -> str:
     for answer in answers:
         clauses = [
             (f"{{}} {_steps(answer)}", answer.within),
-            (f"not {{}}{_size(answer)}", answer.beyond),
+            (f"not {{}}{_in_brackets(_size(answer))}", answer.beyond),
             ("undecided for {}", answer.undecided),
         ]
         for clause, scenes in clauses:
             if scenes:
                 where = f" in {named(scenes, 'scene')}" if answer.scenes > 1 else ""
-                said.setdefault(clause + where, []).append(answer.engine)
+                said.setdefault(clause + where, []).append(human_label(answer.engine))
     text = _tolerance(answers[0].metric, within)
     clauses_of = (clause.format(named(engines, "engine", len(engines))) for clause, engines in said.items())
     return f"{text[0].upper()}{text[1:]}: {'; '.join(clauses_of)}."
@@ -69,11 +83,12 @@ def _tolerance(metric: str, within: float) -> str:
 
 
 def _size(answer: Answer) -> str:
-    """The largest error in brackets; empty if the engine broke down in each of its scenes."""
+    """How large the errors beyond the tolerance are; empty if there are none, or if the engine broke down in one of these scenes."""
     if math.isnan(answer.largest):
         return ""
     unit = METRICS[answer.metric].unit
-    return f" ({formatted(answer.largest)} {unit})" if unit == "rad" else f" ({100 * answer.largest:.3g} %)"
+    size = f"{short(answer.largest)} {unit}" if unit == "rad" else f"{short(100 * answer.largest)} %"
+    return f"{'up to ' if len(answer.beyond) > 1 else ''}{size}"
 
 
 def _steps(answer: Answer) -> str:
@@ -87,23 +102,29 @@ def _steps(answer: Answer) -> str:
 
 def _exceptions(answer: Answer) -> str:
     """The scenes in which an engine is not within the tolerance, or not known to be."""
-    parts = [f"with {answer.condition} ({len(answer.beyond) - len(answer.named)} scenes)"] if answer.condition else []
-    parts += [f"in {named(answer.named, 'scene')}"] if answer.named else []
+    size, count = _size(answer), f"{len(answer.beyond) - len(answer.named)} scenes"
+    parts = [f"with {answer.condition}{_in_brackets(count, '' if answer.named else size)}"] if answer.condition else []
+    parts += [f"in {named(answer.named, 'scene')}{_in_brackets(size)}"] if answer.named else []
     except_ = f", except {' and '.join(parts)}" if parts else ""
     return f"{except_}, undecided in {named(answer.undecided, 'scene')}" if answer.undecided else except_
+
+
+def _in_brackets(*texts: str) -> str:
+    """The texts that are not empty, in brackets after a space."""
+    return f" ({', '.join(filter(None, texts))})" if any(texts) else ""
 
 
 def _absent(answer: Answer) -> str:
     """The number of scenes in which an engine has no result."""
     count = answer.scenes - len(answer.within) - len(answer.beyond) - len(answer.undecided)
-    return f" (no result in {counted(count, 'scene')})" if count else ""
+    return f", no result in {counted(count, 'scene')}" if count else ""
 
 
 def _cost(results: Results) -> list[str]:
     """What a second of motion costs with each engine at the finest time step, the cheapest first; none if no engine was timed."""
     dt = results.table["dt"].min()
     times = {engine: time / dt for engine, time in step_times(results).items() if not math.isnan(time)}
-    costs = [f"{engine} {duration(float(f'{times[engine]:.2g}'))}" for engine in sorted(times, key=times.__getitem__)]
+    costs = [f"{human_label(engine)} {duration(float(f'{times[engine]:.2g}'))}" for engine in sorted(times, key=times.__getitem__)]
     return [f"1 s of motion at dt = {in_ms(dt)} takes {', '.join(costs)}."] if costs else []
 
 
@@ -111,5 +132,5 @@ def _undecided(results: Results) -> list[str]:
     """A sentence on the scenes in which an engine has the mark ~; none if there are none."""
     statuses = results.statuses().items()
     marked = {engine: [scene for scene, by_engine in statuses if by_engine[engine].reason == UNDECIDED] for engine in results.engines}
-    parts = [f"{engine} in {named(scenes, 'scene')}" for engine, scenes in marked.items() if scenes]
+    parts = [f"{human_label(engine)} in {named(scenes, 'scene')}" for engine, scenes in marked.items() if scenes]
     return [f"Passed, but undecided whether each error vanishes as dt → 0 (~): {'; '.join(parts)}."] if parts else []

@@ -10,6 +10,7 @@ import numpy as np
 from dropspin.comparisons.judging.verdicts import VERDICTS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
+from dropspin.comparisons.results.conclusion import WITHIN
 from dropspin.comparisons.results.results import MODEL_ERROR, UNDECIDED, Results, Status, is_undecided
 from dropspin.reports.stories.numbers import bound, capitalized, in_ms, quantity, short, sized, with_unit
 
@@ -51,6 +52,7 @@ class Leading:
         of: Such as `of 0.1 m`; empty for angles and ratios.
         dt: Time step [s].
         sizes: The size of the error in this unit, as text by engine; of engines with a value.
+        bounds: The bounds of errors that pass though they are above 1 %, in this unit, as text by engine.
         levels: The decade of the error relative to its scale, by engine, from 0 (up to 1e-8) over 1 (up to 1e-7) to 8 (above 0.1); None if
             undefined.
     """
@@ -60,6 +62,7 @@ class Leading:
     of: str
     dt: float
     sizes: dict[str, str]
+    bounds: dict[str, str]
     levels: dict[str, int | None]
 
     @property
@@ -80,8 +83,11 @@ def leading_errors(results: Results) -> dict[str, Leading]:
             parts = {engine: float(values.get(engine, math.nan)) / whole for engine in results.engines}
             percent, of = 1.0 if unit == "rad" else 100.0, "" if unit in ("1", "rad") else f"of {whole:.2g} {unit}"
             sizes = {engine: short(percent * part) for engine, part in parts.items() if not math.isnan(part)}
+            large = finest[(finest["verdict"] == "passed") & (values > WITHIN * whole)]
+            allowed = (large["upper"].where(large["value"] > 0.0, -large["lower"]) / whole).dropna()
+            bounds = {str(engine): f"≤ {short(percent * part)}" for engine, part in allowed.items()}
             levels = {engine: level(part) for engine, part in parts.items()}
-            found[name] = Leading(metric, "rad" if unit == "rad" else "%", of, dt, sizes, levels)
+            found[name] = Leading(metric, "rad" if unit == "rad" else "%", of, dt, sizes, bounds, levels)
     return found
 
 

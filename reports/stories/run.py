@@ -8,7 +8,7 @@ from dropspin.comparisons.results.results import Results, Status
 from dropspin.comparisons.running.forecast import Forecast
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
-from dropspin.reports.stories.conclusion import conclusion
+from dropspin.reports.stories.conclusion import conclusion, conditions
 from dropspin.reports.stories.failures import Failure, failure_parts, failures, reproduce_drawn
 from dropspin.reports.stories.findings import (
     Counts,
@@ -22,6 +22,7 @@ from dropspin.reports.stories.findings import (
 )
 from dropspin.reports.stories.impact_laws import NOTE, law_rows
 from dropspin.reports.stories.matrix import legend_of_marks, matrix_of
+from dropspin.reports.stories.numbers import listed
 from dropspin.scenarios.text import counted
 
 
@@ -38,6 +39,7 @@ class Overview:
         statuses: The status of each engine in each scene, by scene and engine.
         profiles: Engines with default settings compared with the calibrated ones.
         failures: The failures, grouped.
+        tags: The scenes with each property with which the conclusion excepts scenes.
         laws: The distances of engines to other impact laws, in scenes in which the laws differ: the rows of `law_rows`.
     """
 
@@ -48,6 +50,7 @@ class Overview:
     statuses: Mapping[str, Mapping[str, Status]]
     profiles: Sequence[ProfileComparison]
     failures: Sequence[Failure]
+    tags: Mapping[str, Sequence[str]]
     laws: Sequence[Mapping[str, str]]
 
 
@@ -63,6 +66,7 @@ def overview(results: Results) -> Overview:
         statuses=results.statuses(),
         profiles=profiles,
         failures=failures(results),
+        tags=conditions(results),
         laws=law_rows(results),
     )
 
@@ -82,7 +86,7 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = (), e
     ]
     laws: list[Part] = [Paragraph(NOTE), Table(summary.laws)] if summary.laws else []
     failed = [f"✗ {failure.sentence}" for failure in summary.failures]
-    listed = Sentences(failed, commands=[failure.reproduce for failure in summary.failures], on_terminal=False)
+    failures_listed = Sentences(failed, commands=[failure.reproduce for failure in summary.failures], on_terminal=False)
     versions = ", ".join(f"{name} {version or 'not installed'}" for name, version in results.provenance["versions"].items())
     matrix, notes = matrix_of(results, summary.statuses)
     parts = [
@@ -92,9 +96,10 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = (), e
         Table(matrix, [*reversed(results.engines)], on_page=False),
         Sentences(notes, style="dim", on_page=False),
         Table(statuses, on_terminal=False),
+        Sentences([f"With {tag}: {listed(scenes, 6)}." for tag, scenes in summary.tags.items()], style="dim"),
         Sentences([f"{words}: {meaning}" for words, meaning in legend_of_marks(summary.statuses).items()], on_terminal=False),
         *(replace(part, on_terminal=False) for part in laws),
-        listed,
+        failures_listed,
         *explained,
         Paragraph(f"{versions} on {results.provenance['cpu']}", on_terminal=False),
     ]

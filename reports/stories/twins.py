@@ -25,7 +25,7 @@ def document(findings: Sequence[TwinFinding]) -> Document:
 
 
 def _row(finding: TwinFinding) -> dict[str, str]:
-    """A finding; – means never, or that there is no such difference."""
+    """The row of a finding; – stands for never, or for no such difference."""
     explained = "yes" if finding.unexplained is None else f"not from step {finding.unexplained:,} on"
     return {
         "scene": finding.scene,

@@ -194,7 +194,7 @@ def test_a_run_of_the_earlier_format_is_read(tmp_path):
     (old / "run.json").write_text(signed(content | {"format": 5}), encoding="utf-8")
     again, other, judged = load_results(old), load_results(folder), ["basis", "verdict", "reason"]
     assert again.table.loc[0, "basis"] == "fault_absent"
-    assert "an implementation of Wang's lecture note" in (folder / "report.html").read_text(encoding="utf-8")
+    assert "that of Wang's lecture note" in (folder / "report.html").read_text(encoding="utf-8")
     assert again.engines == other.engines
     assert again.trajectories.keys() == other.trajectories.keys()
     for name in ("table", "agreements"):
@@ -347,8 +347,8 @@ def test_the_page_shows_orders_and_asymptotic_errors(studied):
     """Orders in a column of their own, with window and limit; model errors named above and on a chip."""
     text = studied[1].replace("\xa0", " ")
     assert "known fault in 1 (model error) of 1 scene; largest error: orientation 2.67 rad at dt = 2 ms in spin-asymmetric; " in text
-    assert "mujoco: passed in 1 of 1 scene; " in text
-    assert len(re.findall(r'<span class="status known">†<span class="words"> known fault</span></span>', text)) == 1
+    assert "MuJoCo: passed in 1 of 1 scene; " in text
+    assert len(re.findall(r'<span class="status known">†<span class="words">&nbsp;known fault</span></span>', text)) == 1
     assert len(re.findall(r">order 1\.0[012] ", text)) >= 4
     assert ">→ 0.753</td>" in text
     assert "fitted at 0.008, 0.004, 0.002 s; claimed 1" in text
@@ -370,7 +370,7 @@ def test_two_time_steps_give_no_asymptotic_errors():
     assert not found.table["kind"].isin(["order", "asymptotic_error"]).any()
     [sentence] = overview(found).findings
     assert sentence.startswith(
-        "mujoco: not judged in 1 (measured) of 1 scene; no asymptotic errors, which need three time steps that span a factor of four; "
+        "MuJoCo: not judged in 1 (measured) of 1 scene; no asymptotic errors, which need three time steps that span a factor of four; "
     )
 
 

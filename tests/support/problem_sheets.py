@@ -86,7 +86,7 @@ def _solution(scene, truth):
     if truth is None:
         return ["None is known."]
     return [
-        f"By {KINDS[truth.name]}: {truth.statement}. To {DIGITS} significant digits of the largest component of each quantity:",
+        f"By {KINDS[truth.name]}: {truth.statement}. The states, to {DIGITS} significant digits of the largest component of each quantity:",
         _states(scene, truth),
         *_impacts(scene, truth),
         *_horizon(scene, truth),

@@ -6,14 +6,14 @@ from dropspin.scenarios.bodies.inertia import is_diagonal
 
 CONVENTIONS = """SI units. The world frame is right-handed with y up. x and v are the position and the velocity of the centre of
 mass, and ω is the angular velocity, all in the world frame. q = [x, y, z, w] is a unit quaternion with the scalar last that turns
-vectors of the body frame, whose origin is the centre of mass, into the world frame: r_world = q r_body q*, dq/dt = ½ [ω, 0] q. Of q
-and -q, which are one orientation, the one with w ≥ 0 is printed. M is the mass, I the inertia tensor turned into the world frame,
+vectors of the body frame, whose origin is the centre of mass, into the world frame: r_world = q r_body q*, dq/dt = ½ [ω, 0] q. q
+and −q are the same orientation; the one with w ≥ 0 is printed. M is the mass, I the inertia tensor turned into the world frame,
 and L = I ω."""
 
 FLIGHT = "In flight dv/dt = g and dL/dt = 0."
 IMPACT = """The body is in flight until a point of it reaches the floor and descends. An impact takes no time and does not
-change x and q: an impulse j acts at this point, at r from the centre of mass, whose velocity is u = v + ω × r; v changes by j/M and
-ω by I⁻¹ (r × j)."""
+change x and q. An impulse j acts at this point, which is at r from the centre of mass and has the velocity u = v + ω × r. It changes
+v by j/M and ω by I⁻¹ (r × j)."""
 SMOOTH = "j is vertical (no friction), and such that u_y becomes -e u_y (Newton's restitution); the horizontal parts of u may change too."
 STICKING = """j is such that u becomes [0, -e u_y, 0]: Newton's restitution of the normal velocity, and infinite friction, which
 ends the sliding of this point whatever the ratio of the tangential to the normal impulse."""
@@ -21,8 +21,8 @@ CONE = """u_y becomes -e u_y (Newton's restitution), and j is in the cone of Cou
 vertical part j_y. Either the horizontal part of u becomes 0, or it becomes s d with a unit vector d and s > 0, and then
 j = j_y ([0, 1, 0] - f d): friction acts against the slip that is left, which need not have the direction of the slip before."""
 EDGE = "The two ends of an edge strike at once, with equal velocities; r is the middle of the edge."
-SEVERAL = """Where several points touch a plane at once, as when the body rests, these laws do not determine the impulses: a method has a
-rule of its own."""
+SEVERAL = """Where several points touch a plane at once, as when the body rests, these laws do not determine the impulses: each method
+has its own rule."""
 PENDULUM = """The body stands on one edge, that of its lowest corners, which stays at rest on the floor. The body turns about it
 without friction or slip, as a rigid pendulum: (I_e + M R²) d²ψ/dt² = M |g| R sin ψ, with ψ the angle from the direction against
 gravity to the line from the edge to the centre of mass, R the length of this line and I_e the moment of inertia about the direction

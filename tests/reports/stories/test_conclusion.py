@@ -12,6 +12,7 @@ from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.conclusion import CONDITIONS
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.table import Measurement, as_table
+from dropspin.reports.plots.colours import human_label
 from dropspin.reports.stories.conclusion import conclusion
 
 SCENES = {
@@ -23,6 +24,7 @@ METRICS |= {"orientation": "orientation_error", "position": "position_error"}
 UNITS = {"orientation_error": "rad", "position_error": "m"}
 ENGINES = ("a", "mujoco[integrator=rk4,cone=elliptic]", "an other", "c")
 STEPS = (4e-3, 2e-3, 1e-3, 2.5e-4)
+BROKEN = ("broken", "crashed", "timed_out", "diverged")
 COUNT = 60
 """Random runs, a tenth of a second each."""
 
@@ -66,7 +68,7 @@ def records(run):
 def state(run, metric, engine, scene, dt):
     """What the rows say about an engine at a time step: within the tolerance, beyond it, undecided, or not tried."""
     rows = [row for row in records(run) if (row["engine"], row["scene"], row["dt"]) == (engine, scene, dt)]
-    if any(row["verdict"] in ("broken", "crashed", "timed_out", "diverged") for row in rows):
+    if any(row["verdict"] in BROKEN for row in rows):
         return "beyond"
     errors = [row for row in rows if row["metric"] == metric and row["kind"] == "truth"]
     if not errors:
@@ -91,11 +93,28 @@ def named(text, scenes):
 
 
 STEP = r"at (?:(?P<any>any step tried)|(?P<dt>\S+) ms(?P<less> or less)?|the finest step of each scene)"
-SAID = re.compile(rf"(?P<no>not |undecided for )?(?P<engines>.+?)(?: {STEP}| \((?P<size>\S+) (?:%|rad)\))?(?: in (?P<scenes>.+))?")
+SIZE = r"(?:up to )?\S+ (?:%|rad)"
+SAID = re.compile(rf"(?P<no>not |undecided for )?(?P<engines>.+?)(?: {STEP}| \((?P<size>{SIZE})\))?(?: in (?P<scenes>.+))?")
 USED = re.compile(
-    rf"{STEP}(?:, except (?:with (?P<condition>.+) \((?P<covered>\d+) scenes\))?(?: and )?(?:in (?P<named>.+?))?)?"
-    r"(?:, undecided in (?P<undecided>.+?))?(?: \(no result in (?P<absent>\d+) scenes?\))?"
+    rf"{STEP}(?:, except (?:with (?P<condition>.+) \((?P<covered>\d+) scenes(?:, {SIZE})?\))?"
+    rf"(?: and )?(?:in (?P<named>.+?)(?: \({SIZE}\))?)?)?"
+    r"(?:, undecided in (?P<undecided>.+?))?(?:, no result in (?P<absent>\d+) scenes?)?"
 )
+
+
+def verify_size(run, metric, engine, text, beyond):
+    """The size of the largest error in some scenes, each of which has one."""
+    rows = [row for row in records(run) if (row["metric"], row["engine"]) == (metric, engine) and row["scene"] in beyond]
+    finest = {scene: min(states(run, metric, engine, scene)) for scene in beyond}
+    sizes = [abs(row["value"]) / scale(SCENES[row["scene"]], row["unit"]) for row in rows if row["dt"] == finest[row["scene"]]]
+    broken = [row for row in records(run) if row["engine"] == engine and row["verdict"] in BROKEN and row["dt"] == finest.get(row["scene"])]
+    said = re.findall(r"[(, ](up to )?([^\s(]+) (%|rad)\)", text)
+    if not beyond or broken:
+        assert not said
+        return
+    [[up_to, size, unit]] = said
+    assert bool(up_to) == (len(beyond) > 1)
+    assert float(size) == pytest.approx((100.0 if unit == "%" else 1.0) * max(sizes), rel=0.06)
 
 
 def verify_use(run, metric, engine, clause):
@@ -123,14 +142,17 @@ def verify_use(run, metric, engine, clause):
     assert named(said["named"], rest) if rest else said["named"] is None
     assert named(said["undecided"], kinds["undecided"]) if kinds["undecided"] else said["undecided"] is None
     assert int(said["absent"] or 0) == len(tested) - len(finest)
+    verify_size(run, metric, engine, clause, kinds["beyond"])
 
 
-def verify_count(run, metric, engine, within, scenes):
+def verify_count(run, metric, engine, within, scenes, size):
     """The number of scenes of an engine that is not recommended."""
     tested = {row["scene"] for row in records(run) if row["metric"] == metric and row["kind"] == "truth"}
     of = [found for scene in tested if (found := states(run, metric, engine, scene))]
     kept = [found for found in of if found[min(found)] == "within"]
     assert (len(kept), len(tested)) == (within, scenes)
+    beyond = {scene for scene in tested if (found := states(run, metric, engine, scene)) and found[min(found)] == "beyond"}
+    verify_size(run, metric, engine, size, beyond)
     assert len(kept) < 3 or 2 * len(kept) <= len(of) or len(set(map(tuple, kept))) > 1
 
 
@@ -160,7 +182,7 @@ def test_each_claim_is_that_of_the_rows(seed):
     random = np.random.default_rng(seed)
     run = random_run(random, random.choice([0.01, 1e-3, 0.5]))
     within = run.provenance["asked"]["within"]
-    sentences = conclusion(run)
+    sentences = [sentence.replace(human_label(ENGINES[1]), ENGINES[1]) for sentence in conclusion(run)]
     assert 1 <= len(sentences) <= 5
     for sentence in sentences:
         size = rf"within (?:{100 * within:g} %(?: of the scene's lengths)?|{within:g} rad)"
@@ -181,8 +203,8 @@ def test_each_claim_is_that_of_the_rows(seed):
 
 
 def verify_counts(run, metric, text):
-    found = re.findall(r"(.+?) \(within it in (\d+) of (\d+) scenes\)(?:, |$)", text)
-    for engine, within, scenes in found:
+    found = re.findall(rf"(.+?) \(within it in (\d+) of (\d+) scenes((?:, {SIZE})?)\)(?:, |$)", text)
+    for engine, within, scenes, size in found:
         assert engine in run.engines
-        verify_count(run, metric, engine, int(within), int(scenes))
+        verify_count(run, metric, engine, int(within), int(scenes), f"{size})")
     return found

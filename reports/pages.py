@@ -29,11 +29,17 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "outcome", "formatted", "quantity", "duration")}
-    environment.filters |= {"unbroken": _unbroken, "human": human_label}
+    environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "outcome", "quantity", "duration")}
+    environment.filters |= {"unbroken": _unbroken, "human": human_label, "minus": with_minus}
+    environment.filters["formatted"] = lambda value: with_minus(numbers.formatted(value))
     environment.filters |= {"chart_data": chart_data, "sha256": _base64_sha256}
-    environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": MARKS}
+    environment.globals |= {"subject": numbers.subject, "marks": MARKS}
     return environment
+
+
+def with_minus(text: str) -> str:
+    """A text whose negative numbers have a minus sign instead of a hyphen, except in settings and lists, which may be copied."""
+    return re.sub(r"(?:^|(?<=[(±])|(?<=[a-z→:…] ))-(?=[.0-9])", "−", text)
 
 
 def _unbroken(text: str) -> str:

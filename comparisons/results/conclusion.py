@@ -34,7 +34,7 @@ class Answer:
         steps: The time steps [s] that were tried in each scene of `within`, smallest first.
         condition: What at least two scenes of `beyond`, and none of the others, have: of `CONDITIONS` the one that most have; or empty.
         named: The scenes of `beyond` that do not have it.
-        largest: The largest error of `beyond` at the finest time step, relative to its scale; NaN without one, and if the engine broke down.
+        largest: The largest error of `beyond` at the finest time step, relative to its scale; NaN without one, or after a breakdown.
         cost: Median of the computing time per simulated second, at `dt`; NaN if it was not measured.
     """
 

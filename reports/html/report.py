@@ -17,7 +17,7 @@ from dropspin.comparisons.results.table import OF_SYMMETRIES
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from dropspin.reports.document import Document
 from dropspin.reports.html.strip import strip_of
-from dropspin.reports.pages import page
+from dropspin.reports.pages import page, with_minus
 from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.plots.colours import engine_colours
@@ -159,7 +159,8 @@ def _all_results(results: Results, scene_name: str, rows: pd.DataFrame) -> dict[
     found = []
     for row in rows.assign(place=rows["metric"].map(metrics)).sort_values(["place", "engine", "dt"]).to_dict("records"):
         name = numbers.subject(row["metric"], row["kind"]) + numbers.unit(row["unit"])
-        values = [row["engine"], numbers.in_ms(row["dt"]), numbers.formatted(row["value"]), numbers.bound(row["lower"], row["upper"])]
+        shown = map(with_minus, (numbers.formatted(row["value"]), numbers.bound(row["lower"], row["upper"])))
+        values = [row["engine"], numbers.in_ms(row["dt"]), *shown]
         judged = [f"{MARKS[row['verdict']]} {numbers.outcome(row['verdict'])}", row["cause"], row["reason"]]
         listed = (texts.setdefault(text, len(texts)) for text in [name, *values, *judged])
         found.append([engines[row["engine"]], int(row["verdict"] == "failed"), *listed])

@@ -84,7 +84,7 @@ class CheckedLog(Study):
 def _row(value: Value, note: str | None) -> dict[str, str]:
     """A value with its interval; of one that is not identifiable, what it needs."""
     name, small = {"quantity": value.name}, value.unit in ("m", "rad") and abs(value.value) < SMALL
-    scale, unit = (1e3, f"m{value.unit}") if small else (1.0, value.unit)
+    scale, unit = (1e3, f"m{value.unit}") if small else (1.0, value.unit.replace("s^1.5", "(s √s)"))
     if note is not None:
         return {**name, "value": "not identifiable", "95 % interval": f"needs {note}"}
     half = scale * value.half_width

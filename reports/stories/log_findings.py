@@ -117,7 +117,7 @@ def corrections(recording: str, findings: Iterable[Finding]) -> list[str]:
 
 
 def _words(cause: Cause) -> str:
-    """A cause in words; empty if its keys say it."""
+    """A cause in words; empty if its keys state it."""
     text = CAUSES.get(cause.name, "")
     if abs(cause.share) <= 0.5:
         text = LESS_OR_MORE[cause.name][cause.share > 0.0]

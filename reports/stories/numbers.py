@@ -13,7 +13,7 @@ from dropspin.scenarios.text import counted, rounded
 MOST_NAMED = 3
 """Scenes, metrics or engines that a sentence names; of more it has the number."""
 SEVERAL = 1.02
-"""Sum of shares from which on they are those of alternatives."""
+"""Sum of shares above which they belong to alternative explanations."""
 Item = TypeVar("Item")
 Key = TypeVar("Key")
 

@@ -80,7 +80,7 @@ def test_page_of_a_release_says_what_changed_in_it_and_has_the_command_of_each_c
 
 def test_page_of_a_scene_has_error_range_over_starts_and_cost(site):
     text = Page(site / "scene-drop-ball.html").text
-    assert "mujoco 3.11.0 4.00e-06 2.00e-06 to 8.00e-06 500 µs 1.00e-06 5.00e-07 to 2.00e-06 2 ms" in text
+    assert "MuJoCo 3.11.0 4.00e-06 2.00e-06 to 8.00e-06 500 µs 1.00e-06 5.00e-07 to 2.00e-06 2 ms" in text
 
 
 def test_index_has_the_digits_of_the_newest_releases(site):
@@ -95,7 +95,7 @@ def test_index_has_the_digits_of_the_newest_releases(site):
 
 def test_index_counts_releases_with_results_and_tells_results_from_scenes_that_were_declined_before(site):
     text = Page(site / "index.html").text
-    assert "mujoco : 3 of 4 releases have results; results changed in 3.11.0; scenes gained or lost results in 3.10.0 ( badge" in text
+    assert "MuJoCo : 3 of 4 releases have results; results changed in 3.11.0; scenes gained or lost results in 3.10.0 ( badge" in text
 
 
 def test_page_of_an_engine_counts_the_results_of_others_that_are_the_same(site):

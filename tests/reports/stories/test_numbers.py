@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from dropspin.reports.pages import with_minus
 from dropspin.reports.stories.matrix import level
 from dropspin.reports.stories.numbers import duration, failing, formatted, left_out
 
@@ -52,3 +53,18 @@ def test_counts_and_reasons_are_sentences():
         "Left out: rapier is not installed: pip install x.",
         "Left out: a, diverged.",
     ]
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("-0.3", "−0.3"),
+        ("energy error is -0.96, -0.95 → -0.94", "energy error is −0.96, -0.95 → −0.94"),
+        ("-1.2 to -0.3 (-2 … -1)", "−1.2 to −0.3 (−2 … −1)"),
+        ("center_of_mass = [0.1, -0.2, -3]", "center_of_mass = [0.1, -0.2, -3]"),
+        ('solref="-400 -0.5"', 'solref="-400 -0.5"'),
+        ("x = -0.3; drop-box-2, 1e-3", "x = -0.3; drop-box-2, 1e-3"),
+    ],
+)
+def test_negative_numbers_on_pages_have_a_minus_sign_but_what_may_be_copied_has_a_hyphen(text, shown):
+    assert with_minus(text) == shown

@@ -11,7 +11,7 @@ from dropspin.comparisons.judging.verdicts import OUTCOMES, VERDICTS
 from dropspin.comparisons.results.results import MODEL_ERROR, UNDECIDED, Status
 from dropspin.reports.junit import junit_xml
 from dropspin.reports.plots.colours import human_label
-from dropspin.reports.stories.matrix import MEANINGS, explanations
+from dropspin.reports.stories.matrix import MEANINGS, explanations, leading_errors
 from dropspin.reports.stories.run import overview
 
 
@@ -28,11 +28,24 @@ def core(core_run):
         ("spin-asymmetric", "mujoco", "passed", "", "passed"),
         ("slide-box", "wang", "declined", "declined", "not judged (declined)"),
         ("slide-box", "mujoco", "limited", "limited", "not judged (limited)"),
+        ("turn-box-flat", "pybullet", "passed", "", "passed"),  # undecided, with an error of 1.7e-12 at the finest time step
     ],
 )
 def test_engine_has_one_status_in_a_scene(core, scene, engine, verdict, reason, words):
     status = overview(core).statuses[scene][engine]
     assert (*status, status.words) == (verdict, reason, words)
+
+
+def test_large_error_that_passes_has_its_bound_beside_it(core):
+    leading = leading_errors(core)
+    assert (leading["fall-damped"].sizes["pybullet"], leading["fall-damped"].bounds["pybullet"]) == ("17", "≤ 30")
+    assert leading["slip-stick"].bounds == {}  # a known fault, and errors below 1 %
+
+
+def test_scenes_have_the_property_with_which_the_conclusion_excepts_them(core):
+    with_friction = [name for name, scene in core.scenes.items() if any(0.0 < one.coefficient < np.inf for one in scene.surfaces)]
+    assert overview(core).tags == {"Coulomb friction": with_friction}
+    assert any("with Coulomb friction" in sentence for sentence in overview(core).conclusion)
 
 
 def test_every_status_has_a_meaning():

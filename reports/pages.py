@@ -10,8 +10,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from dropspin.comparisons.judging.verdicts import MARKS
 from dropspin.reports.plots.chart_data import chart_data
-from dropspin.reports.plots.colours import human_label
+from dropspin.reports.plots.colours import NAMES, human_label, in_sentence
 from dropspin.reports.stories import numbers
+
+LABELS = re.compile(rf"(?<![\w'=/.\[-])(?<!-e )(?<!rerun )(?:{'|'.join(sorted(NAMES, reverse=True))})(?![\w-]|[.:]\w)(?:\[[^\]]*\])?")
+"""The labels of engines that have names."""
 
 
 def page(template: str, **content: Any) -> str:
@@ -30,7 +33,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "outcome", "quantity", "duration")}
-    environment.filters |= {"unbroken": _unbroken, "human": human_label, "minus": with_minus}
+    environment.filters |= {"unbroken": _unbroken, "human": human_label, "minus": with_minus, "names": with_names}
     environment.filters["formatted"] = lambda value: with_minus(numbers.formatted(value))
     environment.filters |= {"chart_data": chart_data, "sha256": _base64_sha256}
     environment.globals |= {"subject": numbers.subject, "marks": MARKS}
@@ -40,6 +43,11 @@ def _environment() -> Environment:
 def with_minus(text: str) -> str:
     """A text whose negative numbers have a minus sign instead of a hyphen, except in settings and lists, which may be copied."""
     return re.sub(r"(?:^|(?<=[(±])|(?<=[a-z→:…] ))-(?=[.0-9])", "−", text)
+
+
+def with_names(text: str) -> str:
+    """A sentence with the names of engines in place of their labels, except in commands."""
+    return LABELS.sub(lambda label: in_sentence(label[0]), text)
 
 
 def _unbroken(text: str) -> str:

@@ -25,7 +25,7 @@ NAMES = {name: home.adapter for name, home in BUILT_IN.items()} | {
 }
 """The names of engines as their authors write them; an engine that is not listed keeps the name by which commands take it."""
 OPTIONS = {"integrator=rk4": "RK4", "rotation=rk4": "RK4", "integrator=euler": "Euler", "profile=default": "default settings"}
-LABEL = re.compile(r"[^\[\]\s]+(\[[^\[\]]*\])?")
+LABEL = re.compile(r"([^\[\]\s,]+(?:\[[^\[\]]*\])?)(, .*)?")
 
 
 class EngineStyle(NamedTuple):
@@ -61,11 +61,20 @@ def engine_colours(engines: Sequence[str]) -> dict[str, str]:
 
 
 def human_label(label: str) -> str:
-    """An engine and its options as a reader writes them: `MuJoCo, RK4` for `mujoco[integrator=rk4]`; any other text unchanged."""
-    if not LABEL.fullmatch(label):
+    """An engine and its options as a reader writes them: `MuJoCo, RK4` for `mujoco[integrator=rk4]`; any other text unchanged.
+
+    What follows the label after a comma stays, as in `mujoco, in milliseconds`.
+    """
+    if not (parts := LABEL.fullmatch(label)):
         return label
-    name, options = parts_of(label)
-    return ", ".join([NAMES.get(name, name.rpartition(":")[2]), *map(_in_words, options)])
+    name, options = parts_of(parts[1])
+    return ", ".join([NAMES.get(name, name.rpartition(":")[2]), *map(_in_words, options)]) + (parts[2] or "")
+
+
+def in_sentence(label: str) -> str:
+    """An engine as a sentence names it: `MuJoCo (RK4)` for `mujoco[integrator=rk4]`."""
+    name, _, settings = human_label(label).partition(", ")
+    return f"{name} ({settings})" if settings else name
 
 
 def _in_words(option: str) -> str:

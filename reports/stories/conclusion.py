@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.results.conclusion import CONDITIONS, ENOUGH, WITHIN, Answer, conclude
 from dropspin.comparisons.results.results import UNDECIDED, Results
-from dropspin.reports.plots.colours import human_label
+from dropspin.reports.plots.colours import in_sentence
 from dropspin.reports.stories.matrix import step_times
 from dropspin.reports.stories.numbers import duration, grouped, in_ms, named, quantity, short
 from dropspin.scenarios.text import counted
@@ -42,12 +42,12 @@ def _recommendation(answers: Sequence[Answer], within: float) -> str:
     """Which engines to use for a question that enough scenes test, the best first, and which not."""
     ordered = sorted(answers, key=lambda answer: (-len(answer.within), math.isnan(answer.cost), answer.cost))
     used = [
-        f"{human_label(answer.engine)} {_steps(answer)}{_exceptions(answer)}{_absent(answer)}"
+        f"{in_sentence(answer.engine)} {_steps(answer)}{_exceptions(answer)}{_absent(answer)}"
         for answer in ordered
         if answer.is_recommended
     ]
     others = [
-        f"{human_label(answer.engine)}{_in_brackets(f'within it in {len(answer.within)} of {answer.scenes} scenes', _size(answer))}"
+        f"{in_sentence(answer.engine)}{_in_brackets(f'within it in {len(answer.within)} of {answer.scenes} scenes', _size(answer))}"
         for answer in ordered
         if not answer.is_recommended
     ]
@@ -69,7 +69,7 @@ def _statement(answers: Sequence[Answer], within: float) -> str:
         for clause, scenes in clauses:
             if scenes:
                 where = f" in {named(scenes, 'scene')}" if answer.scenes > 1 else ""
-                said.setdefault(clause + where, []).append(human_label(answer.engine))
+                said.setdefault(clause + where, []).append(in_sentence(answer.engine))
     text = _tolerance(answers[0].metric, within)
     clauses_of = (clause.format(named(engines, "engine", len(engines))) for clause, engines in said.items())
     return f"{text[0].upper()}{text[1:]}: {'; '.join(clauses_of)}."
@@ -124,7 +124,7 @@ def _cost(results: Results) -> list[str]:
     """What a second of motion costs with each engine at the finest time step, the cheapest first; none if no engine was timed."""
     dt = results.table["dt"].min()
     times = {engine: time / dt for engine, time in step_times(results).items() if not math.isnan(time)}
-    costs = [f"{human_label(engine)} {duration(float(f'{times[engine]:.2g}'))}" for engine in sorted(times, key=times.__getitem__)]
+    costs = [f"{in_sentence(engine)} {duration(float(f'{times[engine]:.2g}'))}" for engine in sorted(times, key=times.__getitem__)]
     return [f"1 s of motion at dt = {in_ms(dt)} takes {', '.join(costs)}."] if costs else []
 
 
@@ -132,5 +132,5 @@ def _undecided(results: Results) -> list[str]:
     """A sentence on the scenes in which an engine has the mark ~; none if there are none."""
     statuses = results.statuses().items()
     marked = {engine: [scene for scene, by_engine in statuses if by_engine[engine].reason == UNDECIDED] for engine in results.engines}
-    parts = [f"{human_label(engine)} in {named(scenes, 'scene')}" for engine, scenes in marked.items() if scenes]
+    parts = [f"{in_sentence(engine)} in {named(scenes, 'scene')}" for engine, scenes in marked.items() if scenes]
     return [f"Passed, but undecided whether each error vanishes as dt → 0 (~): {'; '.join(parts)}."] if parts else []

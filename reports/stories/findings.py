@@ -16,7 +16,7 @@ from dropspin.comparisons.judging.error_budget import is_determined, is_sufficie
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, OUTCOMES, VERDICTS, with_reason
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.results.results import SMALLEST_STATED, Results, Status, relative_sizes
-from dropspin.reports.plots.colours import human_label
+from dropspin.reports.plots.colours import in_sentence
 from dropspin.reports.stories.matrix import step_times
 from dropspin.reports.stories.numbers import duration, failing, formatted, in_ms, named, quantity, sized, with_unit
 from dropspin.scenarios.text import counted
@@ -85,7 +85,7 @@ class ProfileComparison:
         most = sum(part > 0.5 for part in parts)
         are = "is mostly a setting error" if most == 1 else "are mostly setting errors"
         return (
-            f"{human_label(self.engine)}: {most} of its {counted(len(parts), 'error')} above {SMALLEST_STATED:g} "
+            f"{in_sentence(self.engine)}: {most} of its {counted(len(parts), 'error')} above {SMALLEST_STATED:g} "
             f"at the finest time step {are} (median share {100 * statistics.median(parts):.1f} %)."
         )
 
@@ -154,7 +154,7 @@ def _known(results: Results, tally: Counts) -> str:
         (tally.limited, "value is not judged (limited)", "values are not judged (limited)"),
     ):
         if len(rows):
-            engines = named([human_label(engine) for engine in results.engines if engine in set(rows["engine"])], "engine")
+            engines = named([in_sentence(engine) for engine in results.engines if engine in set(rows["engine"])], "engine")
             parts += f"; {counted(len(rows), one, many)}: {engines} in {counted(rows['scene'].nunique(), 'scene')}"
     return parts + (f"; {counted(tally.fixed, 'expected fault does', 'expected faults do')} not occur" if tally.fixed else "")
 
@@ -181,7 +181,7 @@ def finding_sentences(results: Results) -> list[str]:
             _convergence(results, engine, {scene: of[engine] for scene, of in statuses.items()}, remain),
             *_cost(engine, times, results.provenance.get("compilation", {}).get(engine)),
         ]
-        sentences.append(f"{human_label(engine)}: {'; '.join(parts)}.")
+        sentences.append(f"{in_sentence(engine)}: {'; '.join(parts)}.")
     return sentences
 
 
@@ -217,7 +217,7 @@ def beside_recordings(results: Results) -> Iterator[str]:
         finest = rows.loc[rows["dt"] == rows["dt"].min(), "value"]
         if "uncertainty" in finest:
             value = with_unit(f"{formatted(finest['truth'])} ± {formatted(finest['uncertainty'])}", METRICS[metric].unit)
-            yield f"{human_label(engine)}: {quantity(metric)} {value} from the recording in {scene}."
+            yield f"{in_sentence(engine)}: {quantity(metric)} {value} from the recording in {scene}."
 
 
 def _largest(results: Results, errors: "pd.DataFrame") -> str:
@@ -241,6 +241,6 @@ def _cost(engine: str, times: Mapping[str, float], compilation: float | None) ->
     absolute = f"{duration(float(f'{timed[engine]:.2g}'))} per step"
     fastest = min(timed, key=timed.__getitem__)
     ratio = float(f"{timed[engine] / timed[fastest]:.2g}")
-    relative = "" if engine == fastest or ratio == 1.0 else f", {ratio:g} times that of {human_label(fastest)}"
+    relative = "" if engine == fastest or ratio == 1.0 else f", {ratio:g} times that of {in_sentence(fastest)}"
     compiling = "" if compilation is None else f", after compiling a scene for up to {duration(float(f'{compilation:.2g}'))}"
     return [f"{absolute}{relative}{compiling}"]

@@ -14,7 +14,7 @@ from dropspin.comparisons.results.conclusion import WITHIN
 from dropspin.comparisons.results.results import MODEL_ERROR, UNDECIDED, Results, Status, is_undecided
 from dropspin.reports.stories.numbers import bound, capitalized, in_ms, quantity, short, sized, with_unit
 
-MOST_SCENES = 24
+MOST_SCENES = 18
 """Largest number of rows on a terminal. Of more scenes, those in which no engine has a finding are left out first, then those with the
 least severe findings.
 """

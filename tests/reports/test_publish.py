@@ -54,7 +54,7 @@ def test_every_link_leads_to_a_page_and_ids_are_unique(site):
 def test_page_of_an_engine_says_what_changed_in_which_release(site):
     """12.7 dt before and 0.001 dt from 3.11.0 on; 3.10.1 could not be installed and is passed over."""
     text = Page(site / "engine-mujoco.html").text
-    both = "with mujoco, mujoco[profile=default]"
+    both = "with MuJoCo, MuJoCo (default settings)"
     newest, older = text[text.index("3.11.0 after 3.10.0; 8 values changed") :].split("3.10.0 after 3.9.0; 4 values changed")
     assert f"spin-asymmetric {both}: orientation error 0.0127 → 1.00e-06 rad at dt = 1 ms" in newest
     assert f"drop-ball {both}: declined → measured (before: {HOSTILE})" in older
@@ -70,7 +70,7 @@ def test_page_of_an_engine_says_what_changed_in_which_release(site):
 def test_page_of_a_release_says_what_changed_in_it_and_has_the_command_of_each_cell(site):
     text = Page(site / "release-mujoco-3.11.0.html").text
     assert "What changed after 3.10.0 8 values, over all metrics and time steps, differ from those of 3.10.0" in text
-    assert "drop-ball with mujoco, mujoco[profile=default]: bounce height error 0.0127 → 1.00e-06 at dt = 1 ms" in text
+    assert "drop-ball with MuJoCo, MuJoCo (default settings): bounce height error 0.0127 → 1.00e-06 at dt = 1 ms" in text
     for label in ("mujoco", "'mujoco[profile=default]'"):
         assert f"To repeat a result: dropspin record rerun {label} 3.11.0 SCENE" in text
     assert "drop-ball bounce height error 4.00e-06 2.00e-06 to 8.00e-06 1.00e-06 5.00e-07 to 2.00e-06 6.0 2 ms" in text

@@ -12,7 +12,7 @@ from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.conclusion import CONDITIONS
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.table import Measurement, as_table
-from dropspin.reports.plots.colours import human_label
+from dropspin.reports.plots.colours import in_sentence
 from dropspin.reports.stories.conclusion import conclusion
 
 SCENES = {
@@ -182,7 +182,7 @@ def test_each_claim_is_that_of_the_rows(seed):
     random = np.random.default_rng(seed)
     run = random_run(random, random.choice([0.01, 1e-3, 0.5]))
     within = run.provenance["asked"]["within"]
-    sentences = [sentence.replace(human_label(ENGINES[1]), ENGINES[1]) for sentence in conclusion(run)]
+    sentences = [sentence.replace(in_sentence(ENGINES[1]), ENGINES[1]) for sentence in conclusion(run)]
     assert 1 <= len(sentences) <= 5
     for sentence in sentences:
         size = rf"within (?:{100 * within:g} %(?: of the scene's lengths)?|{within:g} rad)"

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from dropspin.reports.pages import with_minus
+from dropspin.reports.pages import with_minus, with_names
 from dropspin.reports.stories.matrix import level
 from dropspin.reports.stories.numbers import duration, failing, formatted, left_out
 
@@ -68,3 +68,18 @@ def test_counts_and_reasons_are_sentences():
 )
 def test_negative_numbers_on_pages_have_a_minus_sign_but_what_may_be_copied_has_a_hyphen(text, shown):
     assert with_minus(text) == shown
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("wang: mujoco[integrator=rk4] at 2 ms, dominated by mujoco.", "Wang's method: MuJoCo (RK4) at 2 ms, dominated by MuJoCo."),
+        (
+            "rapier-js and rapier; integrated-newton, my_newton:Newton",
+            "Rapier (JavaScript) and Rapier; integrated-newton, my_newton:Newton",
+        ),
+        ("dropspin run x -e mujoco -e 'mujoco[cone=elliptic]'", "dropspin run x -e mujoco -e 'mujoco[cone=elliptic]'"),
+    ],
+)
+def test_sentences_of_pages_name_engines_but_commands_have_their_labels(text, shown):
+    assert with_names(text) == shown

@@ -42,7 +42,7 @@ def _environment() -> Environment:
 
 def with_minus(text: str) -> str:
     """A text whose negative numbers have a minus sign instead of a hyphen, except in settings and lists, which may be copied."""
-    return re.sub(r"(?:^|(?<=[(±])|(?<=[a-z→:…] ))-(?=[.0-9])", "−", text)
+    return re.sub(r"(?:^|(?<=[(±])|(?<=[a-z→:…] )|(?<=, )(?=\S+ to ))-(?=[.0-9])", "−", text)
 
 
 def with_names(text: str) -> str:

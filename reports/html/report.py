@@ -20,7 +20,7 @@ from dropspin.reports.html.strip import strip_of
 from dropspin.reports.pages import page, with_minus
 from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.chart_data import chart_data
-from dropspin.reports.plots.colours import engine_colours
+from dropspin.reports.plots.colours import engine_colours, human_label
 from dropspin.reports.plots.convergence import PREDICTED
 from dropspin.reports.plots.figures import CHARTS
 from dropspin.reports.replay import as_data, replay_of
@@ -160,7 +160,7 @@ def _all_results(results: Results, scene_name: str, rows: pd.DataFrame) -> dict[
     for row in rows.assign(place=rows["metric"].map(metrics)).sort_values(["place", "engine", "dt"]).to_dict("records"):
         name = numbers.subject(row["metric"], row["kind"]) + numbers.unit(row["unit"])
         shown = map(with_minus, (numbers.formatted(row["value"]), numbers.bound(row["lower"], row["upper"])))
-        values = [row["engine"], numbers.in_ms(row["dt"]), *shown]
+        values = [human_label(row["engine"]), numbers.in_ms(row["dt"]), *shown]
         judged = [f"{MARKS[row['verdict']]} {numbers.outcome(row['verdict'])}", row["cause"], row["reason"]]
         listed = (texts.setdefault(text, len(texts)) for text in [name, *values, *judged])
         found.append([engines[row["engine"]], int(row["verdict"] == "failed"), *listed])

@@ -61,6 +61,7 @@ def test_counts_and_reasons_are_sentences():
         ("-0.3", "−0.3"),
         ("energy error is -0.96, -0.95 → -0.94", "energy error is −0.96, -0.95 → −0.94"),
         ("-1.2 to -0.3 (-2 … -1)", "−1.2 to −0.3 (−2 … −1)"),
+        ("-0.2, -0.47 to 0.06", "−0.2, −0.47 to 0.06"),
         ("center_of_mass = [0.1, -0.2, -3]", "center_of_mass = [0.1, -0.2, -3]"),
         ('solref="-400 -0.5"', 'solref="-400 -0.5"'),
         ("x = -0.3; drop-box-2, 1e-3", "x = -0.3; drop-box-2, 1e-3"),

@@ -133,14 +133,14 @@ def test_filter_of_engines_acts_on_plots_and_replay(opened):
     page = opened("report.html", viewport={"width": 1600, "height": 900})
     one = Chart(page, "drop-box-corner", "height [m]")
     page.start_replays()
-    page.tab.get_by_role("checkbox", name="mujoco", exact=True).first.uncheck()
+    page.tab.get_by_role("checkbox", name="MuJoCo", exact=True).first.uncheck()
     assert "mujoco" not in one.lines()
     assert not one.home.get_by_role("button", name="MuJoCo", exact=True).is_visible()
     shown = page.tab.evaluate(
         "document.querySelector('[data-scene=drop-box-corner] [data-replay]').viewer.motions.map((motion) => [motion.label, motion.shown])"
     )
     assert dict(shown) == {"wang": True, "mujoco": False, "exact solution": True}
-    page.tab.get_by_role("checkbox", name="mujoco", exact=True).first.check()
+    page.tab.get_by_role("checkbox", name="MuJoCo", exact=True).first.check()
     assert "mujoco" in one.lines()
 
 

@@ -273,7 +273,7 @@ def test_engines_have_colours_and_markers_of_their_own(count):
         ("my_module:MyEngine[precision=float32]", "MyEngine, precision float32"),
         ("my-engine", "my-engine"),
         ("exact solution", "exact solution"),
-        ("mujoco[integrator=rk4], mirrored", "mujoco[integrator=rk4], mirrored"),
+        ("mujoco[integrator=rk4], mirrored", "MuJoCo, RK4, mirrored"),
     ],
 )
 def test_labels_name_engines_as_their_authors_do(label, name):

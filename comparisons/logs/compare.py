@@ -6,7 +6,7 @@ centre of mass, friction and restitution, the time step; then the noise floor, a
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, pairwise
@@ -160,7 +160,7 @@ def log_compare(
     measured, dt = recorded(starts), time_step(starts)
     given = {entry.label: _given(flights, starts, dt, fit, entry.label) for entry in entries}
     found, left_out = of_each_engine(entries, partial(_errors, given, measured), on_progress, resources, jobs)
-    pairs = [pair for number, kind in enumerate(KINDS) if kind in COMPARED for pair in _pairs(kind, number, found)]
+    pairs = [pair for kind in COMPARED for pair in _pairs(kind, found)]
     return LogComparison(
         len(starts),
         body_length(header.body),
@@ -229,17 +229,15 @@ def _errors(
     return found
 
 
-def _rows(label: str, found: Mapping[str, Array]) -> list[Error]:
+def _rows(label: str, found: Mapping[str, Array]) -> Iterator[Error]:
     """The errors of an engine as given."""
     values, floor = found["as given"], found["drawn starts"]
     lower, upper = intervals_of_means(values)
-    rows = []
     for number, kind in enumerate(KINDS):
         low, high = interval_of_share(values[:, number]) if kind.quantity == "resting face" else (lower[number], upper[number])
         value, noise = _mean(values[:, number]), _mean(floor[:, number])
         tosses = int(np.isfinite(values[:, number]).sum())
-        rows.append(Error(label, kind.quantity, kind.at, kind.unit, value, noise, float(low), float(high), tosses))
-    return rows
+        yield Error(label, kind.quantity, kind.at, kind.unit, value, noise, float(low), float(high), tosses)
 
 
 def _mean(values: Array) -> float:
@@ -248,9 +246,9 @@ def _mean(values: Array) -> float:
     return float(known.mean()) if len(known) else math.nan
 
 
-def _pairs(kind: Kind, number: int, found: Mapping[str, Mapping[str, Array]]) -> list[Pair]:
+def _pairs(kind: Kind, found: Mapping[str, Mapping[str, Array]]) -> list[Pair]:
     """The differences of all pairs of engines, on the tosses that all have."""
-    names = list(combinations(found, 2))
+    number, names = KINDS.index(kind), list(combinations(found, 2))
     if not names:
         return []
     differences = np.stack([found[one]["as given"][:, number] - found[other]["as given"][:, number] for one, other in names], axis=1)
@@ -261,17 +259,14 @@ def _pairs(kind: Kind, number: int, found: Mapping[str, Mapping[str, Array]]) ->
     ]
 
 
-def _shares(label: str, found: Mapping[str, Array]) -> list[Share]:
+def _shares(label: str, found: Mapping[str, Array]) -> Iterator[Share]:
     """The parts of an engine's errors over the motion."""
-    shares = []
-    for number, kind in enumerate(KINDS):
-        if kind not in COMPARED:
-            continue
+    for kind in COMPARED:
+        number = KINDS.index(kind)
         chain = [(what, of_each[:, number]) for what, of_each in found.items() if what != "drawn starts"]
         parts = [(what, before - after) for (_, before), (what, after) in pairwise(chain)]
         floor = found["drawn starts"][:, number]
         parts += [("start", floor), ("remaining", chain[-1][1] - floor)]
         lower, upper = intervals_of_means(np.stack([values for _, values in parts], axis=1))
         for column, (what, values) in enumerate(parts):
-            shares.append(Share(label, kind.quantity, what, float(values.mean()), float(lower[column]), float(upper[column])))
-    return shares
+            yield Share(label, kind.quantity, what, float(values.mean()), float(lower[column]), float(upper[column]))

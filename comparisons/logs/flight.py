@@ -102,18 +102,15 @@ def falls(log: Log, acceleration: Array) -> list[Flight | None]:
 
     Long is more than half as long as the longest one: later parts are between impacts.
     """
-    found: list[Flight | None] = []
-    for toss in log.tosses:
-        size = window_size(toss)
-        if len(toss.t) < size:
-            found.append(None)
-            continue
-        near = is_near(accelerations(toss, size), acceleration)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
-        runs = [Flight(toss, int(first), int(end) + size - 1) for first, end in edges.reshape(-1, 2)]
-        longest = max(map(len, runs), default=0)
-        found.append(next((run for run in runs if 2 * len(run) > longest), None))
-    return found
+    return [_fall(toss, window_size(toss), acceleration) for toss in log.tosses]
+
+
+def _fall(toss: Toss, size: int, acceleration: Array) -> Flight | None:
+    near = is_near(accelerations(toss, size), acceleration) if len(toss) >= size else np.empty(0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
+    runs = [Flight(toss, int(first), int(end) + size - 1) for first, end in edges.reshape(-1, 2)]
+    longest = max(map(len, runs), default=0)
+    return next((run for run in runs if 2 * len(run) > longest), None)
 
 
 def is_near(pieces: Array, acceleration: Array) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ from dropspin.comparisons.running.belonging import is_uneven, missing_frames, pr
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.errors import DropspinError, UnknownName
 from dropspin.scenarios.loading import read_toml, with_mesh
+from dropspin.scenarios.recording import Noise
 from dropspin.scenarios.rotations import conjugate, dot, length, multiply, rotate
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.surfaces import Floor
@@ -44,13 +45,6 @@ MOVES = 0.1
 """Share of a toss's largest step from which a body moves: below, rounding may repeat a row."""
 OTHER_RATE = 2e-3
 """Relative difference of two rates that is none of rounding."""
-
-
-class Noise(Table):
-    """Standard deviations of the noise of a recording, of one frame [m, rad]."""
-
-    position: Positive
-    orientation: Positive
 
 
 class Header(Table):

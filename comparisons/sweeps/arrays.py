@@ -62,10 +62,9 @@ def _groups(jobs: Jobs) -> Iterable[NDArray[np.intp]]:
     """The indices of jobs that differ only in fields that the kernels take as arrays, and that all have friction or none, as laws need."""
     columns = [column for name, column in jobs.values.items() if name.startswith(OPTION) or not _is_array_field(name, column)]
     columns += [column > 0.0 for name, column in jobs.values.items() if name == FRICTION and column.dtype == float]
-    groups: dict[str, list[int]] = {}
-    for index, key in enumerate(map(repr, zip(*columns, strict=True)) if columns else [""] * len(jobs)):
-        groups.setdefault(key, []).append(index)
-    return map(np.array, groups.values())
+    keys = list(map(repr, zip(*columns, strict=True))) if columns else [""] * len(jobs)
+    _, groups, sizes = np.unique(keys, return_inverse=True, return_counts=True)
+    return np.split(np.argsort(groups, kind="stable"), np.cumsum(sizes)[:-1])
 
 
 def _representative_scene(jobs: Jobs) -> Scenario | None:

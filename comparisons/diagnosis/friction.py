@@ -95,12 +95,10 @@ def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     if not facts.lands or not _is_ball(facts):
         return []
     radius, inertia = float(facts.colliding[0].shape.semi_axes[0]), float(facts.principal[0].mean())
-    kept = []
-    end = body.settled[-1]
-    for dt in dts:
-        start = end.copy()
-        start[VELOCITY], start[SPIN] = [1.0, 0.0, 0.0], [0.0, 0.0, -1.0 / radius]
-        kept.append(body.motions(start[np.newaxis], dt, round(1.0 / dt), -facts.gravity * UP, floor=True)[0, -1, VELOCITY][0])
+    start = body.settled[-1:].copy()
+    start[:, VELOCITY], start[:, SPIN] = [1.0, 0.0, 0.0], [0.0, 0.0, -1.0 / radius]
+    ends = [body.motions(start, dt, round(1.0 / dt), -facts.gravity * UP, floor=True)[0, -1] for dt in dts]
+    kept = [end[VELOCITY][0] for end in ends]
     answer = Answer("roll", KEPT, "1", speed=1.0, physical=1.0)
     if facts.rolling or not facts.friction:
         return [replace(answer, measured=float(kept[0]))]

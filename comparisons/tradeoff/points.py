@@ -169,13 +169,9 @@ class TradeOff:
 
     def _within(self, within: float) -> list[CostPoint]:
         """The configurations within a tolerance, with those of the same engine at all finer time steps."""
-        kept, exceeded = [], set()
-        for point in sorted(self.points, key=lambda point: point.dt):
-            if point.error > within:
-                exceeded.add(point.engine)
-            if point.engine not in exceeded:
-                kept.append(point)
-        return kept
+        points = sorted(self.points, key=lambda point: point.dt)
+        exceeding = {point.engine: point.dt for point in reversed(points) if point.error > within}  # the finest step of each engine
+        return [point for point in points if point.dt < exceeding.get(point.engine, math.inf)]
 
 
 def _pareto_front(points: Sequence[CostPoint], cost: Callable[[CostPoint], float]) -> list[CostPoint]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from dropspin.comparisons.judging.verdicts import VERDICTS
 from dropspin.comparisons.measuring.metrics import METRICS
@@ -116,14 +117,15 @@ def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> dict[str, s
 
 def explanations(results: Results, statuses: Mapping[str, Mapping[str, Status]]) -> dict[str, dict[str, str]]:
     """Why an engine has its status, by scene and engine: the error of the matrix with its bound, and the reason."""
+    leading = {scene: of_scene.leading_errors(scene) for scene, of_scene in results.by_scene.items()}
     return {
-        scene: {engine: _explanation(of_scene, scene, engine, statuses[scene][engine]) for engine in results.engines}
+        scene: {engine: _explanation(of_scene, leading[scene], engine, statuses[scene][engine]) for engine in results.engines}
         for scene, of_scene in results.by_scene.items()
     }
 
 
-def _explanation(results: Results, scene: str, engine: str, status: Status) -> str:
-    mine, errors = results.table[results.table["engine"] == engine], results.leading_errors(scene)
+def _explanation(results: Results, errors: pd.DataFrame, engine: str, status: Status) -> str:
+    mine = results.table[results.table["engine"] == engine]
     metric = str(errors["metric"].iloc[0]) if len(errors) else ""
     sentences = [_with_bound(metric, row) for row in errors[errors.index == engine].to_dict("records")]
     if status.words == "passed":

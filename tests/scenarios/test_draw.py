@@ -19,7 +19,7 @@ def drawn():
 def test_a_scene_depends_on_its_seed_and_number_only(drawn):
     """Not on how many are drawn; other seeds and numbers give other scenes."""
     assert draw(3, 7) == drawn[:3]
-    assert len({scene.digest for scene in [*drawn, *draw(15, 8)]}) == 30
+    assert len({scene.digest for scene in [*drawn, *draw(3, 8)]}) == 18
 
 
 def test_a_drawn_scene_is_loaded_by_its_name(drawn):
@@ -72,7 +72,7 @@ def test_draws_span_the_stated_ranges():
 
 
 def test_full_inertia_tensors_are_drawn_with_a_floor_and_without(drawn):
-    corners = [drawn_scene(1, number) for number in range(7, 100, 10)]
+    corners = [drawn_scene(1, number) for number in range(7, 50, 10)]
     assert any(not is_diagonal(scene.body.inertia_tensor) for scene in corners)
     assert not any(is_diagonal(scene.body.inertia_tensor) for scene in drawn if scene.tags[1] == "free-tensor")
 

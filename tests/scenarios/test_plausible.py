@@ -75,7 +75,7 @@ def test_scenes_on_slopes_in_free_fall_and_drawn_ones_are_not_mentioned():
         load(scene(BOX, gravity={"acceleration": [0.0, 0.0, -9.81]}))
         load(scene(BOX, **FLOOR | {"gravity": {"acceleration": [9.5, -0.2, 0.0]}}))
         load(scene(BOX, **FLOOR | {"gravity": {"acceleration": [0.0, 0.0, 0.0]}}))
-        for number in range(1, 3 * len(FAMILIES)):
+        for number in range(1, len(FAMILIES)):
             load(f"draw-7-{number}")
 
 

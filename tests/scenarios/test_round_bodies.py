@@ -96,26 +96,13 @@ def test_moments_of_surfaces_of_parts():
 
 @pytest.mark.parametrize("half_extents", [(0.1, 0.2, 0.35), (0.02, 0.4, 0.05)])
 def test_moments_of_the_surface_of_an_ellipsoid(half_extents):
-    """Against the area element |∂x/∂θ × ∂x/∂φ|, integrated over an octant to 16 digits; measured 3e-15."""
-    with mp.workdps(16):
-        a, b, c = map(mp.mpf, half_extents)
-
-        def integral(square):
-            def inner(theta):
-                s, t = mp.sin(theta), mp.cos(theta)
-
-                def at(phi):
-                    u, v = mp.cos(phi), mp.sin(phi)
-                    area = s * mp.sqrt((b * c * s * u) ** 2 + (a * c * s * v) ** 2 + (a * b * t) ** 2)
-                    return area * square(a * s * u, b * s * v, c * t)
-
-                return mp.quad(at, [0, mp.pi / 2])
-
-            return mp.quad(inner, [0, mp.pi / 2])
-
-        area = integral(lambda x, y, z: 1)
-        x, y, z = (integral(square) / area for square in (lambda x, y, z: x**2, lambda x, y, z: y**2, lambda x, y, z: z**2))
-        expected = [float(2 * moment) for moment in (y + z, z + x, x + y)]
+    """Against the area element |∂x/∂θ × ∂x/∂φ|, integrated over an octant by Gauss and Legendre's rule; measured 3e-15."""
+    (a, b, c), (nodes, weights) = half_extents, np.polynomial.legendre.leggauss(200)
+    theta, phi = np.meshgrid(*[np.pi / 4 * (1.0 + nodes)] * 2)
+    x, y, z = a * np.sin(theta) * np.cos(phi), b * np.sin(theta) * np.sin(phi), c * np.cos(theta)
+    area = np.sin(theta) * np.hypot(np.hypot(b * c * x / a, a * c * y / b), a * b * z / c) * np.outer(weights, weights)
+    x, y, z = (np.sum(area * part**2) / np.sum(area) for part in (x, y, z))
+    expected = [2.0 * (y + z), 2.0 * (z + x), 2.0 * (x + y)]
     body = load({"duration": 1.0, "body": {"shape": "ellipsoid", "half_extents": half_extents, "mass": 2.0, "inertia": "surface"}}).body
     np.testing.assert_allclose(body.inertia_tensor, np.diag(expected), rtol=1e-12)
 

@@ -67,7 +67,7 @@ def test_finding_is_printed_with_alternatives_and_remedy_and_is_exit_code_1(reco
     found = re.search(said, done.stdout)
     assert found is not None, done.stdout
     assert [float(number) for number in found.groups()] == pytest.approx([2.0, 1.0], abs=0.3)
-    data = json.loads(dropspin("log", "check", "short.toml", "-o", "out", "--json", cwd=recording).stdout)
+    data = json.loads((recording / "out" / "log_check.json").read_text())
     assert [row["kind"] for row in data if row["row"] == "findings"] == ["scale"]
 
 

@@ -20,6 +20,16 @@ def core(core_run):
     return ds.load_results(core_run, arrays=False)
 
 
+@pytest.fixture(scope="module")
+def summary(core):
+    return overview(core)
+
+
+@pytest.fixture(scope="module")
+def explained(core):
+    return explanations(core, core.statuses())
+
+
 @pytest.mark.parametrize(
     ("scene", "engine", "verdict", "reason", "words"),
     [
@@ -31,8 +41,8 @@ def core(core_run):
         ("turn-box-flat", "pybullet", "passed", "", "passed"),  # undecided, with an error of 1.7e-12 at the finest time step
     ],
 )
-def test_engine_has_one_status_in_a_scene(core, scene, engine, verdict, reason, words):
-    status = overview(core).statuses[scene][engine]
+def test_engine_has_one_status_in_a_scene(summary, scene, engine, verdict, reason, words):
+    status = summary.statuses[scene][engine]
     assert (*status, status.words) == (verdict, reason, words)
 
 
@@ -74,15 +84,14 @@ def test_every_status_has_a_meaning():
         ("slide-box", "wang", r"Not judged \(declined\): the engine or its adapter cannot run the scene; law=note has no Coulomb .*"),
     ],
 )
-def test_explanation_has_the_error_its_bound_and_the_reason(core, scene, engine, pattern):
+def test_explanation_has_the_error_its_bound_and_the_reason(explained, scene, engine, pattern):
     """Also where the check that decides is of another metric than the error shown."""
-    found = explanations(core, core.statuses())[scene][engine]
-    assert re.fullmatch(pattern, found), found
+    assert re.fullmatch(pattern, explained[scene][engine]), explained[scene][engine]
 
 
-def test_undecided_trends_of_the_conclusion_are_the_marks_of_the_matrix(core):
+def test_undecided_trends_of_the_conclusion_are_the_marks_of_the_matrix(core, summary):
     marked = {(scene, engine) for scene, of in core.statuses().items() for engine, status in of.items() if status.mark == "~"}
-    [sentence] = [sentence for sentence in overview(core).conclusion if sentence.startswith("Passed, but undecided")]
+    [sentence] = [sentence for sentence in summary.conclusion if sentence.startswith("Passed, but undecided")]
     clauses = dict(clause.split(" in ") for clause in sentence.partition("(~): ")[2].removesuffix(".").split("; "))
     for engine in core.engines:
         scenes = [scene for scene, of in marked if of == engine]
@@ -114,11 +123,10 @@ def test_error_that_overflows_is_reported(tmp_path):
     assert ds.write_report(results, tmp_path / "run").is_file()
 
 
-def test_known_faults_are_counted_apart_and_in_the_headline(core):
+def test_known_faults_are_counted_apart_and_in_the_headline(core, summary):
     """They are neither passed nor failed; in JUnit they are skipped, with the reason. Negligible ones are not in the headline."""
     judged = core.table[core.table["verdict"] == "known"]
     known = judged[judged["value"].abs() > 1e-4]
-    summary = overview(core)
     assert len(judged) > len(summary.counts.known) == len(known) > 100
     assert summary.counts.passed == (core.table["verdict"] == "passed").sum()
     assert f"{len(known)} values are known faults: Wang's method in {known['scene'].nunique()} scenes" in summary.verdict

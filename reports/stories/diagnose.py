@@ -20,7 +20,7 @@ from dropspin.scenarios.text import counted
 KINDS = {"changed": "changed by the engine", "model": "engine", "target": "target missed"}
 """The words for some kinds of findings; for others their names."""
 LEAST = 1e-9
-"""Values below this are rounding, but for moments of inertia."""
+"""Values below this are rounding, except moments of inertia."""
 STARTS = {"slide": (" from", " at"), "roll": (" from", "")}
 """What stands before the speed and the direction of a start, if not `at` and `about`."""
 COLUMNS = (

@@ -196,6 +196,8 @@ def poses(entry: EngineEntry, scenes: Sequence[Scenario], launched: Launches, dt
         Breakdown: The engine declines a scene.
         Diverged: A motion is not finite.
     """
+    for scene in scenes:
+        verify_accepted(entry.adapter, scene)
     states, steps = launched.states.copy(), launched.frames / dt
     [first] = record_batch(entry.adapter, [whole_steps(scenes[0], dt, 1)], dt)
     states[:, RATES] -= first.motion.velocity_lag * _rates_of_rates(scenes[0], states)
@@ -203,7 +205,6 @@ def poses(entry: EngineEntry, scenes: Sequence[Scenario], launched: Launches, dt
     order, size = np.argsort(lengths, kind="stable"), max(1, BATCH_ROWS // int(lengths.max()))
     found = np.full((len(scenes), *steps.shape, 7), np.nan)
     for number, scene in enumerate(scenes):
-        verify_accepted(entry.adapter, scene)
         for begin in range(0, len(order), size):
             rows = order[begin : begin + size]
             base = scene.model_copy(update={"duration": math.nextafter(lengths[rows[-1]] * dt, math.inf)})

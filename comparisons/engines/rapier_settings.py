@@ -39,7 +39,7 @@ WORLD = {
     "normalized_prediction_distance": Setting(
         0.02,
         "distance at which a contact begins",
-        why="a step's fall; at 0 turning on a rough floor errs by 0.19 rad, not 5e-3; at 2 cm landings by 1.5%",
+        why="a step's fall; at 0 turning on a rough floor errs by 0.19 rad, not 5e-3; at 2 cm landings by 1.5 %",
         unit="m",
         is_computed=True,
     ),

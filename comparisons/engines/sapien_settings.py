@@ -4,7 +4,7 @@ from dropspin.comparisons.engines.options import Setting
 
 GRIPPING = 1e6
 FASTEST = 1e16  # m/s and rad/s
-TOLERANCE = "m; a box's contacts stay while it moves less than 1/20 of it; at SAPIEN's 0.1 a box gains 8% energy at impacts"
+TOLERANCE = "m; a box's contacts stay while it moves less than 1/20 of it; at SAPIEN's 0.1 a box gains 8 % energy at impacts"
 WORLD = {
     "enable_tgs": Setting(
         True,

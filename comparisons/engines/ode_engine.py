@@ -1,4 +1,4 @@
-"""The engine `ode`: a rigid body of the Open Dynamics Engine, in the library of the system, through the package ode-python.
+"""The engine `ode`: a rigid body of the Open Dynamics Engine, a system library, called through the package ode-python.
 
 ODE solves the contacts of a step together, with the limits of friction of the normal forces that there are without friction.
 """

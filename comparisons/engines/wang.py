@@ -1,4 +1,4 @@
-"""The engine `wang`: the reference implementation of Wang's lecture note, and of the methods beside it."""
+"""The engine `wang`: the reference implementation of the method of Wang's lecture note, and of alternatives to its parts."""
 
 import math
 from collections.abc import Sequence

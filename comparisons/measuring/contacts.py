@@ -8,7 +8,7 @@ The laws of time-stepping methods hold for any number of contact points in the p
 
     N >= 0                  the floor does not pull (A. Signorini, 1933)
     |F| <= f N              friction is within its cone, because that of each contact is (C. A. Coulomb, 1785)
-    F·u + τ ω·Y <= 0        friction opposes the slip that is left (maximal dissipation; J. J. Moreau, 1988)
+    F·u + τ ω·Y <= 0        friction opposes the remaining slip (maximal dissipation; J. J. Moreau, 1988)
 
 with the velocity u = v + ω × (-h Y) of the body at the floor, at the distance h below its centre of mass, after the step. The fourth law
 is that the floor acts only where it touches (complementarity): the lowest point is on the floor.

@@ -230,7 +230,7 @@ def friction_cone_excess(case: Comparison) -> float:
 
 @_metric("1", "invariant", requirements.opposes_slip_left)
 def friction_push(case: Comparison) -> float:
-    """Largest impulse of friction in a time step times the slip that is left in its direction, over the scene's energy."""
+    """Largest impulse of friction in a time step times the remaining slip in its direction, over the scene's energy."""
     return _largest(case.contacts.push)
 
 

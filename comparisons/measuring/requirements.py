@@ -91,7 +91,7 @@ def limits_friction(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def opposes_slip_left(scene: Scenario, truth: Truth | None) -> bool:
-    """A floor that does not end, whose friction opposes the slip that is left, no walls, no damping.
+    """A floor that does not end, whose friction opposes the remaining slip, no walls, no damping.
 
     In other laws friction opposes the slip at each instant of the impact.
     """

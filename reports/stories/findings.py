@@ -71,7 +71,7 @@ class ProfileComparison:
     Attributes:
         engine: Label of the engine with default settings.
         calibrated: Label of the calibrated one.
-        rows: Errors of both at the finest time step; `part` is the share of the first error that the calibrated engine does not have.
+        rows: Errors of both at the finest time step; `part` is the share of the error that the calibrated engine does not have.
     """
 
     engine: str

@@ -77,7 +77,7 @@ def duration(seconds: float) -> str:
 
 
 def failing(count: int, total: int, what: str) -> str:
-    """How many of some things fail, such as 1 of 2 checks fails."""
+    """The number that fail out of all, as a sentence: `1 of 2 checks fails`."""
     return f"{count:,} of {counted(total, what)} {'fails' if count == 1 else 'fail'}"
 
 

@@ -102,7 +102,7 @@ def _shown(changes: Sequence[Change]) -> Change:
 
 
 def _gained(change: Change) -> float:
-    """The size of the change of digits; -1 where there is a value in one of the releases only."""
+    """The size of the change; -1 if only one of the releases has a value."""
     if not change.metric:
         return -1.0
     of = scale(problem(change.scene), METRICS[change.metric].unit)

@@ -70,7 +70,7 @@ def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
     before, after = states(times), states(times)
     before[:, 1] = after[:, 1] = floor_height
     after[:, 8] = speeds[1 : len(times) + 1]
-    statement = "bounce ladder h_k = e^(2k) H with impact times by geometric sums (Newton's restitution)"
+    statement = "height e^(2k) H after impact k with impact times by geometric sums (Newton's restitution)"
     if u0 == 0.0:
         statement = "rest on the floor, angular velocity about the vertical constant, angle ωt"
     return Truth("bounce-ladder", statement, states, impacts_of(times, before, after), until, TURNS_OVER if until < scene.duration else "")

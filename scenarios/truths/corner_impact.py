@@ -43,7 +43,7 @@ LAW_NAMES = {
     "poisson": "Poisson's restitution",
     "clamped": "restitution that adds no energy",
     "coulomb": "Coulomb's friction",
-    "cone": "Coulomb's friction against the slip that is left",
+    "cone": "Coulomb's friction against the remaining slip",
     "integrated-newton": "Coulomb's friction at each instant, Newton's restitution",
     "integrated-poisson": "Coulomb's friction at each instant, Poisson's restitution",
     "integrated-energy": "Coulomb's friction at each instant, Stronge's restitution",

@@ -50,7 +50,7 @@ def cone_impulse(K: Array, u: Array, e: float, friction: float) -> Array | None:
     """The impulse of the cone law [N s], shape (3,), of a point with response K [1/kg], shape (3, 3), and velocity u [m/s], shape (3,)."""
 
     def across(angle: float) -> float:
-        """The slip that is left across d, times the response of the normal."""
+        """The remaining slip across d, times the response of the normal."""
         push = N - friction * _along(angle)
         return float((K[1] @ push) * (u @ _across(angle)) - (1.0 + e) * u[1] * _turning(K, friction, angle))
 

@@ -26,7 +26,7 @@ def random_contact(seed):
 
 
 def test_cone_law_meets_its_definition():
-    """Newton's restitution, and an impulse within the cone that sticks, or on it against the slip that is left; to 1e-12."""
+    """Newton's restitution, and an impulse within the cone that sticks, or on it against the remaining slip; to 1e-12."""
     sticks = slips = turns = 0
     for seed in range(400):
         K, u, e, friction = random_contact(seed)
@@ -177,7 +177,7 @@ def test_laws_agree_for_a_ball_and_differ_for_a_box_whose_slip_turns():
 
 def test_solution_follows_the_law_that_the_scene_names():
     box = {"shape": "box", "half_extents": [0.1, 0.2, 0.3]}
-    assert "against the slip that is left" in truth_for(drop(box, 0.1)).statement
+    assert "against the remaining slip" in truth_for(drop(box, 0.1)).statement
     scene = drop(box, 0.1, "integrated-energy")
     truth = truth_for(scene)
     assert "Stronge's restitution" in truth.statement

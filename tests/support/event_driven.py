@@ -166,7 +166,7 @@ def _impulse(response, u, e, kind, friction):
     sticking = np.linalg.solve(response, np.array([-u[0], -u[1] - e * u[1], -u[2]]))
     if kind == STICKING or math.hypot(sticking[0], sticking[2]) <= friction * sticking[1]:
         return sticking
-    # The cone law, by bisection of the direction of the slip that is left: of all directions, the one that it has itself.
+    # The cone law, by bisection of the direction of the remaining slip: of all directions, the one that it has itself.
     angles = np.linspace(0.0, 2.0 * np.pi, SECTORS + 1)
     turned = _slip(response, u, e, friction, angles)[0] > 0.0
     for n in np.flatnonzero(turned[1:] != turned[:-1]):

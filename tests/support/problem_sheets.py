@@ -77,9 +77,9 @@ def sheet(problem):
 EXACT = "A solution that claims to be exact agrees with every printed digit, within one unit of the last. "
 TOLERANCE = """A numerical solution with the time step dt counts as correct if the absolute value of each metric below is within
 its bound. The bounds are the same for every engine; the scene's file has their reasons ([how metrics are computed](../figures.md))."""
-ENERGY = """ The scene's energy is M |g| H, with H the height of the lowest point above the floor at the start, or the body's largest
-distance from the centre of mass if it starts on the floor, or the kinetic energy at the start, whichever is larger; without a floor, the
-largest kinetic energy."""
+ENERGY = """ With a floor, the scene's energy is M |g| H or the kinetic energy at the start, whichever is larger. H is the height of the
+lowest point above the floor at the start; if the body starts on the floor, H is the largest distance of its points from the centre of
+mass. Without a floor, the scene's energy is the largest kinetic energy."""
 
 
 def _solution(scene, truth):

@@ -19,7 +19,7 @@ STICKING = """j is such that u becomes [0, -e u_y, 0]: Newton's restitution of t
 ends the sliding of this point whatever the ratio of the tangential to the normal impulse."""
 CONE = """u_y becomes -e u_y (Newton's restitution), and j is in the cone of Coulomb friction: its horizontal part is at most f times its
 vertical part j_y. Either the horizontal part of u becomes 0, or it becomes s d with a unit vector d and s > 0, and then
-j = j_y ([0, 1, 0] - f d): friction acts against the slip that is left, which need not have the direction of the slip before."""
+j = j_y ([0, 1, 0] - f d): friction acts against the remaining slip, which need not have the direction of the slip before."""
 EDGE = "The two ends of an edge strike at once, with equal velocities; r is the middle of the edge."
 SEVERAL = """Where several points touch a plane at once, as when the body rests, these laws do not determine the impulses: each method
 has its own rule."""

@@ -120,7 +120,7 @@ def test_pull_fails_under_every_law():
 
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_solution_passes_under_each_law_of_the_scene(law):
-    """Restitutions of Poisson and Stronge are no ratio of speeds, and integrated friction may push along the slip that is left."""
+    """Restitutions of Poisson and Stronge are no ratio of speeds, and integrated friction may push along the remaining slip."""
     scene = with_law(load("drop-tetra-turning"), law)
     found = run(scene, Exact(), quick=True)
     assert found.exit_code() == 0, found.table[found.table["verdict"] == "failed"].to_string()

@@ -230,7 +230,7 @@ def relative_sizes(rows: pd.DataFrame, scenes: Mapping[str, Scenario]) -> list[f
 def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
     """Which rows are asymptotic errors whose interval contains 0 and values that are not negligible, so that no cause is stated.
 
-    An error within rounding at the finest time step leaves no doubt, whatever it is at coarser ones.
+    An error within rounding at the finest time step is not undecided, whatever the errors at coarser time steps are.
     """
     of, reach = ["scene", "engine", "metric"], rows[["lower", "upper"]].abs().max(axis=1)
     errors = rows[rows["kind"].isin(["truth", "invariant"])].sort_values("dt").drop_duplicates(of)

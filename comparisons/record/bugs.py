@@ -49,11 +49,11 @@ class Bug(Table):
         scene: A scene of the catalogue, or a TOML file beside this one.
         dt: The time step [s].
         metric: The metric that shows it.
-        closed_form: Why the value with the fault is in `fault`, as a formula.
+        closed_form: The formula from which the range `fault` follows.
         fault: The least and the largest value of the metric with the fault.
         sound: The largest size of the metric without it.
         releases: Releases to run, oldest first: the first that has the fault, and the first without it, if there is one.
-        silent: Why the unchanged catalogue does not show it; empty if it does.
+        silent: Why no check of the catalogue's scenes detects the fault; empty if one does.
         why_not: Why no scene can show it; empty if one can.
     """
 

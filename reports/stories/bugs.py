@@ -75,7 +75,7 @@ def _said(bug: Bug, outcomes: Sequence[Outcome]) -> list[str]:
     """What the command printed in the newest release that shows the fault, or why nothing; and why releases were not run."""
     shown = [outcome for outcome in outcomes if outcome.state == "shown"]
     printed = [f"Failed check: {shown[-1].said}" if shown[-1].said else "No check fails."] if shown else []
-    silent = [f"The unchanged catalogue does not show it: {bug.silent}."] if bug.silent else []
+    silent = [f"The checks of the catalogue's scenes do not detect the fault: {bug.silent}."] if bug.silent else []
     return [*printed, *silent, *(f"{outcome.release}: {outcome.said}." for outcome in outcomes if outcome.state == "not run")]
 
 
@@ -90,13 +90,10 @@ def _summary(verdicts: Sequence[tuple[Bug, Verdict]]) -> str:
     """How many reports have which verdict."""
     kinds = Counter(verdict.kind for _, verdict in verdicts)
     catalogue = sum(verdict.kind in ("shown", "fixed") and not bug.silent for bug, verdict in verdicts)
-    parts = {
-        "shown": kinds["shown"] + kinds["fixed"],
-        "of these fixed in a later release": kinds["fixed"],
-        "of these by the unchanged catalogue": catalogue,
-    }
-    others = {kind: kinds[kind] for kind in ("not shown", "not expressible", "not run") if kinds[kind]}
-    return f"{counted(len(verdicts), 'case')}: {', '.join(f'{count} {name}' for name, count in (parts | others).items())}."
+    of_these = f"{kinds['fixed']} fixed in a later release and {catalogue} detected by a check of the catalogue's scenes"
+    parts = [f"{kinds['shown'] + kinds['fixed']} shown (of these, {of_these})"]
+    parts += [f"{kinds[kind]} {kind}" for kind in ("not shown", "not expressible", "not run") if kinds[kind]]
+    return f"{counted(len(verdicts), 'case')}: {', '.join(parts)}."
 
 
 def exit_code(verdicts: Sequence[tuple[Bug, Verdict]]) -> int:

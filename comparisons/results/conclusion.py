@@ -34,7 +34,9 @@ class Answer:
         steps: The time steps [s] that were tried in each scene of `within`, smallest first.
         condition: What at least two scenes of `beyond`, and none of the others, have: of `CONDITIONS` the one that most have; or empty.
         named: The scenes of `beyond` that do not have it.
+        declined: The number of scenes that the engine or its adapter declines.
         largest: The largest error of `beyond` at the finest time step, relative to its scale; NaN without one, or after a breakdown.
+        worst: The scene with this error; or empty.
         cost: Median of the computing time per simulated second, at `dt`; NaN if it was not measured.
     """
 
@@ -48,7 +50,9 @@ class Answer:
     steps: tuple[float, ...]
     condition: str
     named: tuple[str, ...]
+    declined: int
     largest: float
+    worst: str
     cost: float
 
     @property
@@ -89,19 +93,21 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     found = errors.assign(size=sizes, state=states, cost=errors["time_per_step"] / errors["dt"])
     keys = ["engine", "scene", "dt"]
     steps = tried[keys].assign(default=np.where(is_broken[tried.index], "beyond", "undecided")).drop_duplicates(keys)
+    declined = table[table["verdict"] == "declined"].drop_duplicates(["engine", "scene"])
     answers = []
     for metric in QUESTIONS:
         rows = found.loc[found["metric"] == metric, [*keys, "state", "size", "cost"]]
         tested = steps[steps["scene"].isin(rows["scene"])].merge(rows, how="left", on=keys)
         tested["state"] = tested["state"].fillna(tested["default"])
         for engine in results.engines:
-            series = tested[tested["engine"] == engine]
+            series, scenes = tested[tested["engine"] == engine], rows["scene"].unique()
             if len(series):
-                answers.append(_answer(metric, engine, rows["scene"].nunique(), series, results.scenes))
+                absent = declined[(declined["engine"] == engine) & declined["scene"].isin(scenes)]
+                answers.append(_answer(metric, engine, len(scenes), len(absent), series, results.scenes))
     return answers
 
 
-def _answer(metric: str, engine: str, scenes: int, series: pd.DataFrame, models: Mapping[str, Scenario]) -> Answer:
+def _answer(metric: str, engine: str, scenes: int, declined: int, series: pd.DataFrame, models: Mapping[str, Scenario]) -> Answer:
     """The answer from an engine's rows of scene, time step, state, relative size of the error, and computing time per simulated second."""
     finest = series.loc[series.groupby("scene", sort=False)["dt"].idxmin()]
     of = {state: tuple(finest.loc[finest["state"] == state, "scene"]) for state in ("within", "beyond", "undecided")}
@@ -115,6 +121,8 @@ def _answer(metric: str, engine: str, scenes: int, series: pd.DataFrame, models:
     condition = max(having, key=lambda name: len(having[name]), default="") if others else ""
     covered = having[condition] if condition and len(having[condition]) > 1 else set()
     dt = max(held, default=math.nan)
+    sizes = finest[finest["state"] == "beyond"].set_index("scene")["size"]
+    largest = float(sizes.max(skipna=False))
     return Answer(
         metric=metric,
         engine=engine,
@@ -124,6 +132,8 @@ def _answer(metric: str, engine: str, scenes: int, series: pd.DataFrame, models:
         steps=tuple(common),
         condition=condition if covered else "",
         named=tuple(scene for scene in beyond if scene not in covered),
-        largest=float(finest.loc[finest["state"] == "beyond", "size"].max(skipna=False)),
+        declined=declined,
+        largest=largest,
+        worst="" if math.isnan(largest) else str(sizes.idxmax()),
         cost=float(kept.loc[kept["dt"] == dt, "cost"].median()),
     )

@@ -2,19 +2,30 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.results.conclusion import CONDITIONS, ENOUGH, WITHIN, Answer, conclude
 from dropspin.comparisons.results.results import UNDECIDED, Results
 from dropspin.reports.plots.colours import in_sentence
 from dropspin.reports.stories.matrix import step_times
-from dropspin.reports.stories.numbers import duration, grouped, in_ms, named, quantity, short
+from dropspin.reports.stories.numbers import MOST_NAMED, duration, grouped, in_ms, named, quantity, short
 from dropspin.scenarios.text import counted
 
 MOST_QUESTIONS = 3
 
 
-def conclusion(results: Results) -> list[str]:
+class Point(NamedTuple):
+    """A sentence of a conclusion: its beginning, and what it says of each engine, which is a line of its own on a page."""
+
+    text: str
+    parts: Sequence[str] = ()
+
+    def __str__(self) -> str:
+        return f"{self.text} {'; '.join(self.parts)}." if self.parts else self.text
+
+
+def conclusion(results: Results) -> list[Point]:
     """At most five sentences: one for each of the first questions, the cost, and what is undecided.
 
     Where too few scenes test a question to recommend an engine for it, the sentences state what these scenes say, and what to run.
@@ -24,11 +35,11 @@ def conclusion(results: Results) -> list[str]:
     tested = [answers for answers in questions.values() if answers[0].scenes >= ENOUGH]
     if tested:
         recommended = [_recommendation(answers, within) for answers in tested[:MOST_QUESTIONS]]
-        return [*recommended, *_cost(results), *_undecided(results)]
+        return [*recommended, *map(Point, [*_cost(results), *_undecided(results)])]
     if not questions and results.recorded:
         return []
     none = f"No recommendation: a question needs {ENOUGH} scenes that test it. dropspin run, without names, runs the core catalogue."
-    return [*(_statement(answers, within) for answers in list(questions.values())[:MOST_QUESTIONS]), none]
+    return [Point(text) for text in [*(_statement(answers, within) for answers in list(questions.values())[:MOST_QUESTIONS]), none]]
 
 
 def conditions(results: Results) -> dict[str, list[str]]:
@@ -38,23 +49,24 @@ def conditions(results: Results) -> dict[str, list[str]]:
     return {name: [scene for scene, model in results.scenes.items() if CONDITIONS[name](model)] for name in excepted}
 
 
-def _recommendation(answers: Sequence[Answer], within: float) -> str:
+def _recommendation(answers: Sequence[Answer], within: float) -> Point:
     """Which engines to use for a question that enough scenes test, the best first, and which not."""
-    ordered = sorted(answers, key=lambda answer: (-len(answer.within), math.isnan(answer.cost), answer.cost))
-    used = [
-        f"{in_sentence(answer.engine)} {_steps(answer)}{_exceptions(answer)}{_absent(answer)}"
-        for answer in ordered
-        if answer.is_recommended
-    ]
-    others = [
-        f"{in_sentence(answer.engine)}{_in_brackets(f'within it in {len(answer.within)} of {answer.scenes} scenes', _size(answer))}"
-        for answer in ordered
-        if not answer.is_recommended
-    ]
-    question, rest = f"For {_tolerance(answers[0].metric, within)}", ", ".join(others)
-    if not used:
-        return f"{question} no engine is recommended: {rest}."
-    return f"{question} use {'; '.join(used)}{f'; not {rest}' if others else ''}."
+    ordered = sorted(answers, key=lambda answer: (not answer.is_recommended, -len(answer.within), math.isnan(answer.cost), answer.cost))
+    question = f"For {_tolerance(answers[0].metric, within)}"
+    if ordered[0].is_recommended:
+        return Point(f"{question} use", [_use(answer) if answer.is_recommended else f"not {_count(answer)}" for answer in ordered])
+    return Point(f"{question} no engine is recommended:", [_count(answer) for answer in ordered])
+
+
+def _use(answer: Answer) -> str:
+    """At which time steps an engine is recommended, and in which scenes not."""
+    return f"{in_sentence(answer.engine)} {_steps(answer)}{_exceptions(answer)}{_absent(answer)}"
+
+
+def _count(answer: Answer) -> str:
+    """In how many scenes an engine that is not recommended is within the tolerance."""
+    count = f"within it in {len(answer.within)} of {answer.scenes} scenes"
+    return f"{in_sentence(answer.engine)}{_in_brackets(count, _size(answer, names_worst=True))}"
 
 
 def _statement(answers: Sequence[Answer], within: float) -> str:
@@ -82,13 +94,18 @@ def _tolerance(metric: str, within: float) -> str:
     return f"{quantity(metric)} within {of}"
 
 
-def _size(answer: Answer) -> str:
-    """How large the errors beyond the tolerance are; empty if there are none, or if the engine broke down in one of these scenes."""
+def _size(answer: Answer, *, names_worst: bool = False) -> str:
+    """How large the errors beyond the tolerance are; empty if there are none, or if the engine broke down in one of these scenes.
+
+    Args:
+        answer: The answer.
+        names_worst: Whether the scene with the largest error is named, because the sentence does not name the scenes.
+    """
     if math.isnan(answer.largest):
         return ""
     unit = METRICS[answer.metric].unit
     size = f"{short(answer.largest)} {unit}" if unit == "rad" else f"{short(100 * answer.largest)} %"
-    return f"{'up to ' if len(answer.beyond) > 1 else ''}{size}"
+    return f"{'up to ' if len(answer.beyond) > 1 else ''}{size}{f' in {answer.worst}' if names_worst else ''}"
 
 
 def _steps(answer: Answer) -> str:
@@ -102,9 +119,10 @@ def _steps(answer: Answer) -> str:
 
 def _exceptions(answer: Answer) -> str:
     """The scenes in which an engine is not within the tolerance, or not known to be."""
-    size, count = _size(answer), f"{len(answer.beyond) - len(answer.named)} scenes"
-    parts = [f"with {answer.condition}{_in_brackets(count, '' if answer.named else size)}"] if answer.condition else []
-    parts += [f"in {named(answer.named, 'scene')}{_in_brackets(size)}"] if answer.named else []
+    count, rest = f"{len(answer.beyond) - len(answer.named)} scenes", answer.named
+    covered = _in_brackets(count, "" if rest else _size(answer, names_worst=True))
+    parts = [f"with {answer.condition}{covered}"] if answer.condition else []
+    parts += [f"in {named(rest, 'scene')}{_in_brackets(_size(answer, names_worst=len(rest) > MOST_NAMED))}"] if rest else []
     except_ = f", except {' and '.join(parts)}" if parts else ""
     return f"{except_}, undecided in {named(answer.undecided, 'scene')}" if answer.undecided else except_
 
@@ -117,7 +135,7 @@ def _in_brackets(*texts: str) -> str:
 def _absent(answer: Answer) -> str:
     """The number of scenes in which an engine has no result."""
     count = answer.scenes - len(answer.within) - len(answer.beyond) - len(answer.undecided)
-    return f", no result in {counted(count, 'scene')}" if count else ""
+    return f", no result in {counted(count, 'scene')}{' (declined)' if count == answer.declined else ''}" if count else ""
 
 
 def _cost(results: Results) -> list[str]:

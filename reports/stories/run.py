@@ -8,7 +8,7 @@ from dropspin.comparisons.results.results import Results, Status
 from dropspin.comparisons.running.forecast import Forecast
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
-from dropspin.reports.stories.conclusion import conclusion, conditions
+from dropspin.reports.stories.conclusion import Point, conclusion, conditions
 from dropspin.reports.stories.failures import Failure, failure_parts, failures, reproduce_drawn
 from dropspin.reports.stories.findings import (
     Counts,
@@ -32,7 +32,7 @@ class Overview:
 
     Attributes:
         verdict: The outcome of the checks in one sentence.
-        conclusion: What a quick run left out, engines that are missing or have default settings, which engine to use for which quantity,
+        points: What a quick run left out, engines that are missing or have default settings, which engine to use for which quantity,
             and the command that draws the same random scenes again.
         findings: The main finding on each engine.
         counts: The number of checks with each verdict.
@@ -44,7 +44,7 @@ class Overview:
     """
 
     verdict: str
-    conclusion: Sequence[str]
+    points: Sequence[Point]
     findings: Sequence[str]
     counts: Counts
     statuses: Mapping[str, Mapping[str, Status]]
@@ -53,14 +53,20 @@ class Overview:
     tags: Mapping[str, Sequence[str]]
     laws: Sequence[Mapping[str, str]]
 
+    @property
+    def conclusion(self) -> list[str]:
+        """The sentences of `points`."""
+        return [str(point) for point in self.points]
+
 
 def overview(results: Results) -> Overview:
     """The overview of a run."""
     tally, profiles = counts(results), profile_comparisons(results)
-    about_engines = [*missing_engines(results), *(profile.sentence for profile in profiles)]
+    before = [*_quick(results), *missing_engines(results), *(profile.sentence for profile in profiles)]
+    after = [*beside_recordings(results), *reproduce_drawn(results)]
     return Overview(
         verdict=verdict_sentence(results, tally),
-        conclusion=[*_quick(results), *about_engines, *conclusion(results), *beside_recordings(results), *reproduce_drawn(results)],
+        points=[*map(Point, before), *conclusion(results), *map(Point, after)],
         findings=finding_sentences(results),
         counts=tally,
         statuses=results.statuses(),

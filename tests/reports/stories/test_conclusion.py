@@ -93,12 +93,12 @@ def named(text, scenes):
 
 
 STEP = r"at (?:(?P<any>any step tried)|(?P<dt>\S+) ms(?P<less> or less)?|the finest step of each scene)"
-SIZE = r"(?:up to )?\S+ (?:%|rad)"
+SIZE = r"(?:up to )?\S+ (?:%|rad)(?: in [a-z-]+)?"
 SAID = re.compile(rf"(?P<no>not |undecided for )?(?P<engines>.+?)(?: {STEP}| \((?P<size>{SIZE})\))?(?: in (?P<scenes>.+))?")
 USED = re.compile(
     rf"{STEP}(?:, except (?:with (?P<condition>.+) \((?P<covered>\d+) scenes(?:, {SIZE})?\))?"
     rf"(?: and )?(?:in (?P<named>.+?)(?: \({SIZE}\))?)?)?"
-    r"(?:, undecided in (?P<undecided>.+?))?(?:, no result in (?P<absent>\d+) scenes?)?"
+    r"(?:, undecided in (?P<undecided>.+?))?(?:, no result in (?P<absent>\d+) scenes?(?P<declined> \(declined\))?)?"
 )
 
 
@@ -106,15 +106,17 @@ def verify_size(run, metric, engine, text, beyond):
     """The size of the largest error in some scenes, each of which has one."""
     rows = [row for row in records(run) if (row["metric"], row["engine"]) == (metric, engine) and row["scene"] in beyond]
     finest = {scene: min(states(run, metric, engine, scene)) for scene in beyond}
-    sizes = [abs(row["value"]) / scale(SCENES[row["scene"]], row["unit"]) for row in rows if row["dt"] == finest[row["scene"]]]
+    at_finest = [row for row in rows if row["dt"] == finest[row["scene"]]]
+    sizes = {row["scene"]: abs(row["value"]) / scale(SCENES[row["scene"]], row["unit"]) for row in at_finest}
     broken = [row for row in records(run) if row["engine"] == engine and row["verdict"] in BROKEN and row["dt"] == finest.get(row["scene"])]
-    said = re.findall(r"[(, ](up to )?([^\s(]+) (%|rad)\)", text)
+    said = re.findall(r"[(, ](up to )?([^\s(]+) (%|rad)(?: in ([a-z-]+))?\)", text)
     if not beyond or broken:
         assert not said
         return
-    [[up_to, size, unit]] = said
+    [[up_to, size, unit, worst]] = said
     assert bool(up_to) == (len(beyond) > 1)
-    assert float(size) == pytest.approx((100.0 if unit == "%" else 1.0) * max(sizes), rel=0.06)
+    assert float(size) == pytest.approx((100.0 if unit == "%" else 1.0) * max(sizes.values()), rel=0.06)
+    assert not worst or sizes[worst] == max(sizes.values())
 
 
 def verify_use(run, metric, engine, clause):
@@ -141,7 +143,10 @@ def verify_use(run, metric, engine, clause):
     rest = kinds["beyond"] - covered
     assert named(said["named"], rest) if rest else said["named"] is None
     assert named(said["undecided"], kinds["undecided"]) if kinds["undecided"] else said["undecided"] is None
-    assert int(said["absent"] or 0) == len(tested) - len(finest)
+    absent = tested - set(finest)
+    assert int(said["absent"] or 0) == len(absent)
+    declining = {row["scene"] for row in records(run) if (row["engine"], row["verdict"]) == (engine, "declined")}
+    assert bool(said["declined"]) == (bool(absent) and absent <= declining)
     verify_size(run, metric, engine, clause, kinds["beyond"])
 
 
@@ -182,29 +187,30 @@ def test_each_claim_is_that_of_the_rows(seed):
     random = np.random.default_rng(seed)
     run = random_run(random, random.choice([0.01, 1e-3, 0.5]))
     within = run.provenance["asked"]["within"]
-    sentences = [sentence.replace(in_sentence(ENGINES[1]), ENGINES[1]) for sentence in conclusion(run)]
+    sentences = [sentence.replace(in_sentence(ENGINES[1]), ENGINES[1]) for sentence in map(str, conclusion(run))]
     assert 1 <= len(sentences) <= 5
     for sentence in sentences:
         size = rf"within (?:{100 * within:g} %(?: of the scene's lengths)?|{within:g} rad)"
         if used := re.fullmatch(rf"For (.+) {size} use (.+)\.", sentence):
             metric = METRICS[used[1]]
-            *clauses, last = used[2].split("; ")
-            not_used = last.removeprefix("not ") if last.startswith("not ") else ""
-            for clause in [*clauses, *([] if not_used else [last])]:
+            clauses = used[2].split("; ")
+            not_used = [clause.removeprefix("not ") for clause in clauses if clause.startswith("not ")]
+            for clause in clauses[: len(clauses) - len(not_used)]:
                 [engine] = [engine for engine in run.engines if clause.startswith(f"{engine} at ")]
                 verify_use(run, metric, engine, clause.removeprefix(f"{engine} "))
             verify_counts(run, metric, not_used)
         elif none := re.fullmatch(rf"For (.+) {size} no engine is recommended: (.+)\.", sentence):
-            assert len(verify_counts(run, METRICS[none[1]], none[2])) > 0
+            verify_counts(run, METRICS[none[1]], none[2].split("; "))
         elif few := re.fullmatch(rf"(.+) {size}: (.+)\.", sentence):
             verify_statement(run, METRICS[few[1].lower()], few[2])
         else:
             assert re.match("1 s of motion|No recommendation: a question needs 3 scenes", sentence)
 
 
-def verify_counts(run, metric, text):
-    found = re.findall(rf"(.+?) \(within it in (\d+) of (\d+) scenes((?:, {SIZE})?)\)(?:, |$)", text)
-    for engine, within, scenes, size in found:
+def verify_counts(run, metric, clauses):
+    """Clauses on engines that are not recommended."""
+    for clause in clauses:
+        said = re.fullmatch(rf"(.+?) \(within it in (\d+) of (\d+) scenes((?:, {SIZE})?)\)", clause)
+        engine, within, scenes, size = said.groups()
         assert engine in run.engines
         verify_count(run, metric, engine, int(within), int(scenes), f"{size})")
-    return found

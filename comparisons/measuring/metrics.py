@@ -52,29 +52,32 @@ def _at_end_of_each_flight(components: Callable[[Comparison, list[int]], Array])
 
 @_metric("1", "truth", requirements.has_truth, signed=True, agreement=True)
 def energy_error(case: Comparison) -> Array:
-    """Largest difference of energy from the exact solution in flight, over the scene's energy, with velocity synchronised with position."""
+    """Largest difference of the energy from the exact energy in flight, relative to the scene's energy.
+
+    Velocities are first synchronised with positions.
+    """
     return _extremes_of_each_flight(errors.energy_error(case), case)
 
 
 @_metric("1", "truth", requirements.has_truth, signed=True)
 def energy_error_raw(case: Comparison) -> Array:
-    """Like energy_error, but with velocities as stored, which in some engines lag positions by half a step."""
+    """Like energy_error, but with the velocities that the engine stores, which in some engines lag positions by half a time step."""
     return _extremes_of_each_flight(errors.energy_error(case, synchronised=False), case)
 
 
 @_metric("1", "invariant", requirements.keeps_energy_in_flight, signed=True, first_flight=True)
 def energy_drift(case: Comparison | Motions) -> Array:
-    """Change of energy from the start to the end of the first flight, over the scene's energy."""
+    """Change of the energy from the start to the end of the first flight, relative to the scene's energy."""
     energy = case.states.energy
     return (at_rows(energy, case.first_flight_end) - energy[..., 0]) / case.energy_scale
 
 
 @_metric("1", "invariant", requirements.gains_no_energy)
 def energy_gain(case: Comparison | Motions) -> Array:
-    """Largest increase of energy above any earlier value, over the scene's energy.
+    """Largest increase of the energy above any earlier value, relative to the scene's energy.
 
-    Energy that a contact may have stored, at most its force times the depth of the lowest point, counts as present. Values at which the
-    body may touch a wall do not count as earlier ones.
+    Energy that a contact may have stored is added to the earlier value; it is at most the contact force times the depth of the lowest
+    point. Earlier values at which the body may touch a wall are left out.
     """
     motions = case.motions if isinstance(case, Comparison) else case
     return motions.energy_gained / case.energy_scale
@@ -82,10 +85,10 @@ def energy_gain(case: Comparison | Motions) -> Array:
 
 @_metric("1", "truth", requirements.has_apex, signed=True, agreement=True, first_flight=True)
 def bounce_height_error(case: Comparison) -> float:
-    """Apex height of the centre of mass after the first impact minus the exact apex height, over the height of the drop.
+    """Apex height of the centre of mass after the first impact minus the exact apex height, relative to the drop height.
 
-    If the exact body rises by less than 1 % of the drop, because it rests, slides, rolls or turns on the floor, the apex is the greatest
-    height that the body reaches, or would reach, at any time after its own first contact.
+    If the exact body rises by less than 1 % of the drop height, because it rests, slides, rolls or turns on the floor, the apex is the
+    greatest height that the body reaches, or would reach in free flight, at any time after its own first contact.
     """
     if (apexes := case.greatest_apexes) is not None:
         return (apexes[0] - apexes[1]) / case.scene.clearance
@@ -98,7 +101,7 @@ def bounce_height_error(case: Comparison) -> float:
 
 @_metric("1", "truth", requirements.has_newton_restitution, signed=True, first_flight=True)
 def restitution_error(case: Comparison) -> float:
-    """Separation speed over approach speed of the contact point in the first impact, minus the coefficient of restitution."""
+    """Ratio of separation speed to approach speed of the contact point in the first impact, minus the coefficient of restitution."""
     assert case.scene.floor is not None
     if not case.impacts or case.impacts[0] > case.motion.t[-1] - 3.0 * case.dt:
         raise Unresolved("the impact occurs in the last three time steps")
@@ -130,19 +133,19 @@ def _moment_in_first_impact(case: Comparison) -> Array:
 
 @_metric("1", "invariant", requirements.has_impact, components=_moment_in_first_impact, first_flight=True)
 def contact_momentum_error(case: Comparison) -> float:
-    """Change of angular momentum about the contact point in the first impact, over M r v.
+    """Change of the angular momentum about the contact point in the first impact, relative to M r v.
 
-    M is the mass, r the distance of the contact point from the centre of mass, and v the speed before the impact. An impulse at the contact
-    point has no moment about it; the impulse of gravity is subtracted.
+    M is the mass, r the distance of the contact point from the centre of mass, and v the speed before the impact. The exact change is 0,
+    because the impulse acts at the contact point. The effect of gravity is subtracted.
     """
     return float(np.linalg.norm(_moment_in_first_impact(case)))
 
 
 @_metric("1", "truth", requirements.comes_to_rest, signed=True)
 def rest_time_error(case: Comparison) -> float:
-    """Time at which the body comes to rest minus the exact time, over the exact time.
+    """Time at which the body comes to rest minus the exact time, relative to the exact time.
 
-    The body is in motion while its kinetic energy, including rotation, exceeds M (2 g dt)²/2 and 1e-6 M g times its size.
+    The body counts as moving while its kinetic energy, including rotation, exceeds both M (2 g dt)²/2 and 1e-6 M g times its size.
     """
     actual, exact = (float(motion.t[Motions.of(case.scene, motion).last_row_in_motion]) for motion in (case.compared, case.exact))
     if exact == 0.0:
@@ -152,14 +155,14 @@ def rest_time_error(case: Comparison) -> float:
 
 @_metric("m/s", "truth", requirements.comes_to_rest)
 def rest_jitter(case: Comparison) -> float:
-    """Root mean square of the vertical velocity in the last tenth of the scene, in which the body rests in the exact solution."""
+    """Root mean square of the vertical velocity in the last tenth of the scene, when the body is at rest in the exact solution."""
     rows = case.motion.t >= 0.9 * case.motion.t[-1]
     return float(np.sqrt(np.mean(case.motion.velocity[rows, 1] ** 2)))
 
 
 @_metric("1", "truth", requirements.lands, signed=True, first_flight=True)
 def landing_error(case: Comparison) -> float:
-    """Ratio of the angular speed three steps after the first landing to that three steps before it, minus the exact ratio."""
+    """Ratio of the angular speeds three time steps after and three time steps before the first landing, minus the exact ratio."""
     edges = [0.0, *case.impacts[:2], case.exact.t[-1]]
     if min(edges[1] - edges[0], edges[2] - edges[1]) < SHORTEST_FLIGHT * case.dt:
         raise Unresolved(f"the body falls and rises again within {SHORTEST_FLIGHT} steps of {case.dt:g} s")
@@ -171,25 +174,25 @@ def landing_error(case: Comparison) -> float:
 
 @_metric("1/s", "truth", requirements.repeats_impacts)
 def desync_rate(case: Comparison) -> float:
-    """Reciprocal of the first time at which the height error reaches half the height of a flight (desynchronised); 0 if there is none."""
+    """Reciprocal of the time at which the height error first reaches half the height of a flight (desynchronised); 0 if it never does."""
     return 1.0 / case.desynchronised_from
 
 
 @_metric("1", "truth", requirements.spins, components=_at_end_of_each_flight(errors.angular_momentum_difference), agreement=True)
 def angular_momentum_error(case: Comparison) -> Array:
-    """Largest difference of angular momentum from the exact solution in flight, over the largest exact value."""
+    """Largest difference of the angular momentum from the exact angular momentum in flight, relative to its largest exact value."""
     return _largest_of_each_flight(errors.angular_momentum_error(case), case)
 
 
 @_metric("rad", "truth", requirements.spins_in_flight)
 def angular_momentum_direction_error(case: Comparison) -> Array:
-    """Largest angle in flight between the angular momentum and the exact angular momentum."""
+    """Largest angle between the angular momentum and the exact angular momentum in flight."""
     return _largest_of_each_flight(errors.angular_momentum_direction_error(case), case)
 
 
 @_metric("1", "invariant", requirements.keeps_horizontal_momentum)
 def horizontal_momentum_error(case: Comparison) -> float:
-    """Largest change of the horizontal velocity, over the speed at which the kinetic energy equals the scene's energy."""
+    """Largest change of the horizontal velocity, relative to the speed at which the kinetic energy equals the scene's energy."""
     sideways = (case.motion.velocity - np.array(case.scene.start.velocity))[:, [0, 2]]
     speed = np.sqrt(2.0 * case.energy_scale / case.scene.body.mass)
     return float(np.max(length(sideways)) / speed)
@@ -197,13 +200,13 @@ def horizontal_momentum_error(case: Comparison) -> float:
 
 @_metric("m", "truth", requirements.has_reference, components=_at_end_of_each_flight(errors.position_difference))
 def position_error(case: Comparison) -> float:
-    """Largest distance of the centre of mass from its exact or measured position."""
+    """Largest distance between the centre of mass and its exact or measured position."""
     return float(np.max(errors.position_error(case)))
 
 
 @_metric("rad", "truth", requirements.has_reference, components=_at_end_of_each_flight(errors.orientation_difference))
 def orientation_error(case: Comparison) -> float:
-    """Largest angle of the rotation from the exact or measured orientation to that of the engine."""
+    """Largest angle of the rotation between the engine's orientation and the exact or measured orientation."""
     return float(np.max(errors.orientation_error(case)))
 
 
@@ -215,7 +218,7 @@ def penetration(case: Comparison | Motions) -> Array:
 
 @_metric("1", "invariant", requirements.obeys_contact_laws)
 def contact_pull(case: Comparison) -> float:
-    """Largest impulse in a time step with which the floor pulls the body, over M v.
+    """Largest impulse with which the floor pulls the body in a time step, relative to M v.
 
     M is the mass, and v the speed at which the kinetic energy equals the scene's energy.
     """
@@ -224,13 +227,16 @@ def contact_pull(case: Comparison) -> float:
 
 @_metric("1", "invariant", requirements.limits_friction)
 def friction_cone_excess(case: Comparison) -> float:
-    """Largest impulse along the floor in a time step beyond friction coefficient times normal impulse, over M v as in contact_pull."""
+    """Largest excess of the impulse along the floor over friction coefficient times normal impulse, in a time step, relative to M v.
+
+    M v is that of contact_pull.
+    """
     return _largest(case.contacts.cone_excess)
 
 
 @_metric("1", "invariant", requirements.opposes_slip_left)
 def friction_push(case: Comparison) -> float:
-    """Largest impulse of friction in a time step times the remaining slip in its direction, over the scene's energy."""
+    """Largest product of friction impulse and remaining slip in its direction, in a time step, relative to the scene's energy."""
     return _largest(case.contacts.push)
 
 

@@ -70,9 +70,12 @@ def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
     before, after = states(times), states(times)
     before[:, 1] = after[:, 1] = floor_height
     after[:, 8] = speeds[1 : len(times) + 1]
-    statement = "height e^(2k) H after impact k with impact times by geometric sums (Newton's restitution)"
+    statement = (
+        "after impact k the body rises to e^(2k) H, with H the drop height; the impact times are sums of a geometric series "
+        "(Newton's restitution)"
+    )
     if u0 == 0.0:
-        statement = "rest on the floor, angular velocity about the vertical constant, angle ωt"
+        statement = "the body rests on the floor and turns about the vertical at the constant angular velocity ω, by the angle ω t"
     return Truth("bounce-ladder", statement, states, impacts_of(times, before, after), until, TURNS_OVER if until < scene.duration else "")
 
 

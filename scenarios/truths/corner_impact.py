@@ -42,11 +42,11 @@ LAW_NAMES = {
     "normal": "normal impulse",
     "poisson": "Poisson's restitution",
     "clamped": "restitution that adds no energy",
-    "coulomb": "Coulomb's friction",
-    "cone": "Coulomb's friction against the remaining slip",
-    "integrated-newton": "Coulomb's friction at each instant, Newton's restitution",
-    "integrated-poisson": "Coulomb's friction at each instant, Poisson's restitution",
-    "integrated-energy": "Coulomb's friction at each instant, Stronge's restitution",
+    "coulomb": "Coulomb friction",
+    "cone": "Coulomb friction against the remaining slip",
+    "integrated-newton": "Coulomb friction at each instant, Newton's restitution",
+    "integrated-poisson": "Coulomb friction at each instant, Poisson's restitution",
+    "integrated-energy": "Coulomb friction at each instant, Stronge's restitution",
 }
 
 
@@ -81,7 +81,8 @@ def corner_impact(scene: Scenario, floor: Floor, law: Law | None = None) -> Trut
     if scene.body.semi_axes.any():
         where = "ball" if scene.body.is_ball else "point"
     count = "one" if len(events) == 1 else str(len(events))
-    statement = f"free rotor and parabola, {count} {where} impact{'s' if len(events) > 1 else ''} ({impulse})"
+    impacts = f"{count} {where} impact{'s' if len(events) > 1 else ''}"
+    statement = f"flights on a parabola, with the rotation of a body without torque, and {impacts} ({impulse})"
     return Truth(f"{where}-impact", statement, states, events, last.end, last.reason)
 
 
@@ -101,7 +102,7 @@ class _Plane:
     def law_name(self) -> str:
         if self.law != "note":
             return LAW_NAMES[self.law]
-        return "eq 15" if self.surface.friction == "none" else "sticking impulse, eq 17"
+        return "eq 15 of Wang's lecture note" if self.surface.friction == "none" else "sticking impulse, eq 17 of Wang's lecture note"
 
     def seen(self, state: Array) -> Array:
         """A state in the frame in which the plane is the floor."""

@@ -46,7 +46,7 @@ def coulomb_slide(scene: Scenario, floor: Floor) -> Truth | None:
         rows[:, POSITION] += way
         return rows
 
-    statement = "deceleration f g against the velocity until it stops (Coulomb)"
+    statement = "dv/dt = g_t - f g_n v/|v| until the body stops; g_t and g_n are gravity along the floor and into it (Coulomb friction)"
     return Truth("coulomb-slide", statement, states, horizon=scene.duration)
 
 

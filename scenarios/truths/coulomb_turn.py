@@ -55,7 +55,7 @@ def coulomb_turn(scene: Scenario, floor: Floor) -> Truth | None:
         rows[:, 11] = math.copysign(1.0, spin) * left
         return rows
 
-    statement = "uniform deceleration by friction at the corners, f M g ρ/I, until it stops (Coulomb)"
+    statement = "friction at the corners, at a distance ρ from the axis, decelerates the box by f M g ρ/I until it stops (Coulomb)"
     return Truth("coulomb-turn", statement, states, horizon=scene.duration)
 
 

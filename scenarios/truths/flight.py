@@ -83,15 +83,16 @@ def flight(scene: Scenario) -> Truth:
     parabola = "" if scene.gravity is None else "x = x0 + v0 t + g t²/2; "
     if not states.rotor.is_steady:
         name = "free-rotor"
-        turning = "Jacobi's elliptic functions for rates and orientation (Landau & Lifshitz, section 37; Whittaker, section 69)"
+        turning = "angular velocity and orientation by Jacobi's elliptic functions (Landau & Lifshitz, section 37; Whittaker, section 69)"
     else:
         spins = states.rotor.largest_spin > 0.0
         name = "principal-spin" if spins else "parabola"
-        turning = "angular velocity constant, angle ωt" if spins else "orientation constant"
+        turning = "the angular velocity ω is constant, and the body turns by the angle ω t" if spins else "the orientation is constant"
     if scene.damping is not None:
         name = f"damped-{name}"
-        parabola = "" if scene.gravity is None else "path with resistance proportional to speed; "
-        turning += ", at the time (1 - exp(-κt))/κ, with decaying rates"
+        parabola = "" if scene.gravity is None else "the centre of mass moves with resistance proportional to its velocity; "
+        if scene.damping.angular:
+            turning += "; with the angular damping κ, (1 - exp(-κ t))/κ replaces t, and ω is multiplied by exp(-κ t)"
     return Truth(name, parabola + turning, states, horizon=states.horizon, ends=TURNS_OVER if states.horizon < scene.duration else "")
 
 

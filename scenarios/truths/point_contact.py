@@ -237,6 +237,6 @@ def _solved(scene: Scenario, contact: _Contact, friction: float) -> Truth:
         ends = min(firsts, key=firsts.__getitem__)
         horizon = float(times[max(firsts[ends] - 1, 0)])
     manner = "rolls without slip" if contact.is_rough else "slides without friction"
-    statement = f"equations of a body that {manner} on one contact point, integrated numerically (DOP853)"
+    statement = f"the equations of a body that {manner} on one contact point, integrated numerically (Runge–Kutta method DOP853)"
     name = "rough-contact" if contact.is_rough else "smooth-contact"
     return Truth(name, statement, states, horizon=min(horizon, scene.duration), ends=ends if horizon < scene.duration else "")

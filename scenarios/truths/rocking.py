@@ -39,7 +39,7 @@ from dropspin.scenarios.truths.elliptic import argument, jacobi
 from dropspin.scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
 from dropspin.scenarios.truths.truth import Impact, Truth, impacts_of, piece
 
-PENDULUM = "inverted pendulum by Jacobi's elliptic functions (Whittaker, section 44)"
+PENDULUM = "the body turns about an edge as an inverted pendulum, solved with Jacobi's elliptic functions (Whittaker, section 44)"
 MAX_LANDINGS = 100_000
 MIN_ENERGY_SHARE = 1e-24
 """Energy of a rocking motion relative to the largest before, below which the body counts as resting, as in the bounce ladder."""
@@ -114,9 +114,9 @@ def rocking(scene: Scenario, floor: Floor) -> Truth | None:
         return Truth("tipping", PENDULUM, states, horizon=falls[0].lands, ends="the body lands on a face and rebounds")
     impacts = _impacts(scene, stand, ladder)
     if np.ptp([fall.edge for fall in falls]) > 1:
-        statement = f"{PENDULUM}; angular momentum about the new edge is conserved at each edge (McGeer 1990)"
+        statement = f"{PENDULUM}; each landing conserves the angular momentum about the new edge (McGeer 1990)"
         return Truth("rimless-wheel", statement, states, impacts, ladder.horizon, ladder.ends)
-    statement = f"{PENDULUM}; angular momentum about the new edge is conserved on landing (Housner 1963)"
+    statement = f"{PENDULUM}; each landing conserves the angular momentum about the new edge (Housner 1963)"
     return Truth("rocking", statement, states, impacts, ladder.horizon, ladder.ends)
 
 

@@ -82,7 +82,7 @@ def rolling(scene: Scenario, floor: Floor) -> Truth | None:
         position = start[POSITION] + velocity * t_ + 0.5 * pull * t_**2 - way
         return np.hstack([position, orientations(t), velocity + pull * t_ - change, spun(spin, change)])
 
-    statement = "friction f g on the contact point until it is at rest, then rolling (Coriolis 1835)"
+    statement = "Coulomb friction accelerates the body until its contact point is at rest; then it rolls without slip (Coriolis 1835)"
     return Truth("rolling", statement, states, horizon=scene.duration)
 
 

@@ -59,7 +59,7 @@ def slipping(scene: Scenario, floor: Floor) -> Truth | None:
         speed = 2.0 * math.sqrt(level) * np.sinh(u) / np.sqrt(1.0 - half_sine**2) / _pace(stand, level, u)
         return _states(scene, stand, t, angle, speed)
 
-    statement = "integrals of energy and of horizontal momentum; time by a Chebyshev series (Clenshaw & Curtis 1960)"
+    statement = "constant energy and horizontal momentum give the time as an integral (by a Chebyshev series, Clenshaw & Curtis 1960)"
     ends = "the body lands on a face" if lands < scene.duration else ""
     return Truth("slipping", statement, states, horizon=min(lands, scene.duration), ends=ends)
 

@@ -70,4 +70,4 @@ def test_ball_of_unequal_moments_follows_the_cone_law_and_a_ball_of_equal_ones_c
     """The slip of the former may turn during the impact."""
     content = ball_with_spin(0.1, [0.001, 0.004, 0.004]).model_dump(exclude_none=True)
     assert "against the remaining slip" in truth_for(load(content)).statement
-    assert truth_for(load(content | {"body": content["body"] | {"inertia": "solid"}})).statement.endswith("(Coulomb's friction)")
+    assert truth_for(load(content | {"body": content["body"] | {"inertia": "solid"}})).statement.endswith("(Coulomb friction)")

@@ -63,30 +63,38 @@ def sheet(problem):
         "## Exact solution" if scene.recording is None else "## Recording",
         *(_solution(scene, truth) if scene.recording is None else _recording(scene)),
         "## Tolerance",
-        paragraph(("" if truth is None else EXACT) + TOLERANCE + (ENERGY if any("energy" in one.metric for one in scene.expect) else "")),
+        paragraph(("" if truth is None else EXACT) + TOLERANCE + _energy(scene)),
         _tolerances(scene),
         "## Source",
         f"{scene.source}.",
-        f"Rerun: `dropspin run {problem.number}`, or `dropspin run {problem.scene}`. "
-        f"Definition: `scenarios/catalogue/{problem.scene}.toml`, digest `{problem.digest}`.",
-        f"Cite as: The dropspin authors, *dropspin*, problem {problem.identifier} ({problem.scene}).",
+        f"Run it with `dropspin run {problem.number}` or `dropspin run {problem.scene}`. The scene file is "
+        f"`scenarios/catalogue/{problem.scene}.toml`; the digest of the definition is `{problem.digest}`.",
+        f"Cite it as: The dropspin authors, *dropspin*, problem {problem.identifier} ({problem.scene}).",
     ]
     return "\n\n".join(parts) + "\n"
 
 
-EXACT = "A solution that claims to be exact agrees with every printed digit, within one unit of the last. "
-TOLERANCE = """A numerical solution with the time step dt counts as correct if the absolute value of each metric below is within
-its bound. The bounds are the same for every engine; the scene's file has their reasons ([how metrics are computed](../figures.md))."""
-ENERGY = """ With a floor, the scene's energy is M |g| H or the kinetic energy at the start, whichever is larger. H is the height of the
-lowest point above the floor at the start; if the body starts on the floor, H is the largest distance of its points from the centre of
-mass. Without a floor, the scene's energy is the largest kinetic energy."""
+EXACT = "An exact solution must agree with every printed digit, within one unit of the last digit. "
+TOLERANCE = """A numerical solution with the time step dt counts as correct if the absolute value of each metric in the table is within its
+bound. The bounds are the same for every engine, and the scene file gives a reason for each. [How results are
+computed](../figures.md) explains the metrics."""
+ENERGY = """ The scene's energy is M |g| H or the kinetic energy at the start, whichever is larger. H is the height of the lowest point
+above the floor at the start; if the body starts on the floor, H is the largest distance of its points from the centre of mass."""
+FREE_ENERGY = " The scene's energy is the largest kinetic energy of the exact motion."
+
+
+def _energy(scene):
+    if not any("energy" in one.metric for one in scene.expect):
+        return ""
+    return FREE_ENERGY if scene.floor is None else ENERGY
 
 
 def _solution(scene, truth):
     if truth is None:
-        return ["None is known."]
+        return ["No exact solution is known."]
     return [
-        f"By {KINDS[truth.name]}: {truth.statement}. The states, to {DIGITS} significant digits of the largest component of each quantity:",
+        f"The solution is computed {KINDS[truth.name]}: {truth.statement}.",
+        f"The table gives states to {DIGITS} significant digits of the largest component of each quantity:",
         _states(scene, truth),
         *_impacts(scene, truth),
         *_horizon(scene, truth),
@@ -97,11 +105,11 @@ def _recording(scene):
     tosses = scene.recording.tosses
     return [
         paragraph(
-            f"""No exact solution, but {len(tosses)} measured tosses of {sum(len(toss.t) for toss in tosses):,} frames in all,
-`scenarios/catalogue/{scene.name}.json`: of each toss the times, positions and orientations of its frames, the state at the end of its
-flight, by which it starts, and 19 states that the flight allows as well. The start above is that of the first. An error is a mean over
-the tosses, and the recording leaves it uncertain by what an engine makes of these states and of the noise of a frame
-([measured motions](../measured.md))."""
+            f"""No exact solution is known. The file `scenarios/catalogue/{scene.name}.json` has {len(tosses)} measured tosses with
+{sum(len(toss.t) for toss in tosses):,} frames in all. For each toss it has the times, positions and orientations of the frames, the
+initial state, which is that at the end of the measured flight, and 19 other initial states that the measured flight allows. The initial
+state above is that of the first toss. An error is a mean over the tosses. Its uncertainty follows from the engine's results for the other
+initial states and from the noise of a frame ([measured motions](../measured.md))."""
         )
     ]
 
@@ -184,12 +192,13 @@ def _impacts(scene, truth):
     end = min(scene.duration, truth.horizon)
     rest = rest_time(truth, end)
     if rest is not None:
-        text = f"The body lies still from t = {decimal(rest, decimals_of(np.array([rest])))} s on"
+        text = f"The body lies still from t = {decimal(rest, decimals_of(np.array([rest])))} s on."
     else:
-        text = f"{len(events)} impact{'s' if len(events) > 1 else ''} until t = {number(round(end, 6))} s"
+        count = f"are {len(events)} impacts" if len(events) > 1 else "is 1 impact"
+        text = f"Until t = {number(round(end, 6))} s there {count}."
     shown = events[:MOST_IMPACTS]
-    first = f". The first {MOST_IMPACTS} impacts" if len(events) > MOST_IMPACTS or rest is not None else ""
-    return [f"{text}{first}; components that are 0 are left out:", table(_impact_rows(scene, truth, shown))]
+    first = f"the first {MOST_IMPACTS} impacts" if len(events) > MOST_IMPACTS or rest is not None else "every impact"
+    return [f"{text} The table gives {first}, without the components that are always 0:", table(_impact_rows(scene, truth, shown))]
 
 
 def _impact_rows(scene, truth, events):
@@ -209,9 +218,9 @@ def _horizon(scene, truth):
     if truth.covers_all(scene.duration):
         return []
     return [
-        f"The exact solution is known until t = {truth.horizon:.4f} s. After it the laws above hold, and with them: in flight, energy, "
-        "horizontal velocity and angular momentum about the centre of mass are constant; in an impact, the angular momentum about the "
-        "point that strikes is."
+        f"The exact solution is known until t = {truth.horizon:.4f} s, because then {truth.ends}. The laws above hold at later times too. "
+        "In flight, the energy, the horizontal velocity and the angular momentum about the centre of mass are therefore constant; in an "
+        "impact, the angular momentum about the striking point is constant."
     ]
 
 

@@ -4,103 +4,105 @@ import numpy as np
 
 from dropspin.scenarios.bodies.inertia import is_diagonal
 
-CONVENTIONS = """SI units. The world frame is right-handed with y up. x and v are the position and the velocity of the centre of
-mass, and ω is the angular velocity, all in the world frame. q = [x, y, z, w] is a unit quaternion with the scalar last that turns
-vectors of the body frame, whose origin is the centre of mass, into the world frame: r_world = q r_body q*, dq/dt = ½ [ω, 0] q. q
-and −q are the same orientation; the one with w ≥ 0 is printed. M is the mass, I the inertia tensor turned into the world frame,
-and L = I ω."""
+CONVENTIONS = """All quantities are in SI units. The world frame is right-handed, and y is up. x and v are the position and the velocity of
+the centre of mass, and ω is the angular velocity; all are in the world frame. The origin of the body frame is the centre of mass. The unit
+quaternion q = [q_x, q_y, q_z, q_w] rotates vectors from the body frame to the world frame: r_world = q r_body q*, and
+dq/dt = ½ [ω, 0] q. q and −q are the same orientation; the tables give the one with q_w ≥ 0. M is the mass, I is the inertia tensor in the
+world frame, and L = I ω is the angular momentum about the centre of mass."""
 
-FLIGHT = "In flight dv/dt = g and dL/dt = 0."
-IMPACT = """The body is in flight until a point of it reaches the floor and descends. An impact takes no time and does not
-change x and q. An impulse j acts at this point, which is at r from the centre of mass and has the velocity u = v + ω × r. It changes
-v by j/M and ω by I⁻¹ (r × j)."""
-SMOOTH = "j is vertical (no friction), and such that u_y becomes -e u_y (Newton's restitution); the horizontal parts of u may change too."
-STICKING = """j is such that u becomes [0, -e u_y, 0]: Newton's restitution of the normal velocity, and infinite friction, which
-ends the sliding of this point whatever the ratio of the tangential to the normal impulse."""
-CONE = """u_y becomes -e u_y (Newton's restitution), and j is in the cone of Coulomb friction: its horizontal part is at most f times its
-vertical part j_y. Either the horizontal part of u becomes 0, or it becomes s d with a unit vector d and s > 0, and then
-j = j_y ([0, 1, 0] - f d): friction acts against the remaining slip, which need not have the direction of the slip before."""
-EDGE = "The two ends of an edge strike at once, with equal velocities; r is the middle of the edge."
-SEVERAL = """Where several points touch a plane at once, as when the body rests, these laws do not determine the impulses: each method
-has its own rule."""
-PENDULUM = """The body stands on one edge, that of its lowest corners, which stays at rest on the floor. The body turns about it
-without friction or slip, as a rigid pendulum: (I_e + M R²) d²ψ/dt² = M |g| R sin ψ, with ψ the angle from the direction against
-gravity to the line from the edge to the centre of mass, R the length of this line and I_e the moment of inertia about the direction
-of the edge through the centre of mass."""
-LANDING = """When the next edge reaches the floor, the body turns about that edge from then on, and the old edge leaves the
-floor: the angular momentum about the new edge is the same before and after (Housner's landing: infinite friction, restitution 0; x
-and q do not jump, v and ω do)."""
-RESTS = """When the body rocks about the two edges of one face, the times between landings become ever shorter and the
-landings accumulate; from then on the body lies still."""
+FLIGHT = "In flight, dv/dt = g and dL/dt = 0."
+IMPACT = """The body is in flight until one of its points reaches the floor while moving down. An impact takes no time and does not
+change x and q. An impulse j acts at this point; it changes v by j/M and ω by I⁻¹ (r × j), where r is the position of the point relative to
+the centre of mass. u = v + ω × r is the velocity of the point."""
+SMOOTH = """The floor has no friction, so j is vertical. Its size is such that u_y becomes -e u_y (Newton's restitution). The horizontal
+components of u may change too."""
+STICKING = """j is such that u becomes [0, -e u_y, 0]: the normal velocity changes by Newton's restitution, and infinite friction ends the
+sliding of this point, however large the tangential impulse must be."""
+CONE = """j is such that u_y becomes -e u_y (Newton's restitution), and it is in the cone of Coulomb friction: its horizontal part is at
+most f times its vertical part j_y. After the impact, the point either sticks or slips. If it sticks, the horizontal part of u is 0. If it
+slips, the horizontal part of u is s d with a unit vector d and s > 0, and j = j_y ([0, 1, 0] - f d): friction opposes the slip after the
+impact, whose direction may differ from that before it."""
+EDGE = "The two ends of the edge strike at the same time, with equal velocities; r is the position of the middle of the edge."
+SEVERAL = """If several points touch a plane at the same time, for example when the body rests, these laws do not determine the impulses.
+Each numerical method has its own rule for this case."""
+PENDULUM = """The body stands on the edge between its lowest corners, which stays at rest on the floor. The body turns about this edge as a
+rigid pendulum, without slip and without a frictional moment: (I_e + M R²) d²ψ/dt² = M |g| R sin ψ. R is the length of the line from the
+edge to the centre of mass, and ψ is the angle of this line from the direction against gravity. I_e is the moment of inertia about the axis
+through the centre of mass parallel to the edge."""
+LANDING = """When the next edge reaches the floor, the body turns about that edge from then on, and the old edge leaves the floor. The
+angular momentum about the new edge is the same before and after this landing (Housner's model, with infinite friction and restitution 0). x
+and q do not jump; v and ω do."""
+RESTS = """When the body rocks between the two edges of one face, the times between landings become ever shorter, and infinitely many
+landings occur within a finite time. From then on, the body lies still."""
 
 LAWS = {
     "principal-spin": (FLIGHT,),
     "free-rotor": (FLIGHT,),
-    "ball-impact": (IMPACT, FLIGHT, "The point of a ball that strikes is the lowest, r = [0, -radius, 0]."),
+    "ball-impact": (IMPACT, FLIGHT, "A ball strikes the floor with its lowest point, r = [0, -radius, 0]."),
     "corner-impact": (IMPACT, FLIGHT),
     "edge-impact": (IMPACT, FLIGHT, EDGE),
     "tipping": (PENDULUM,),
     "rocking": (PENDULUM, LANDING, RESTS),
     "rimless-wheel": (PENDULUM, LANDING, RESTS),
     "slipping": (
-        """The body stands on one edge, that of its lowest corners. The floor exerts only vertical forces, at this edge,
-which stays on the floor and slides: the horizontal velocity of the centre of mass is constant. The energy M v²/2 + ω·L/2 - M g·x is
-constant.""",
+        """The body stands on the edge between its lowest corners, which stays on the floor and slides. The floor exerts only vertical
+forces, at this edge, so that the horizontal velocity of the centre of mass is constant. The energy M v²/2 + ω·L/2 - M g·x is constant.""",
     ),
     "coulomb-slide": (
-        """The box lies flat and stays so: the normal force acts where it balances the moment of friction. While it slides,
-friction has the size f M |g_y| and acts against v: dv/dt = g_t - f |g_y| v/|v|, with g_t the horizontal part of g. It stops where v
-is 0 and stays there if |g_t| ≤ f |g_y|; it does not start if it is at rest and this holds.""",
+        """The box lies flat and stays flat, because the normal force acts where it balances the moment of friction. While the box slides,
+friction has the size f M |g_y| and opposes v: dv/dt = g_t - f |g_y| v/|v|, where g_t is the horizontal part of g. When v becomes 0, the box
+stops, and it stays at rest if |g_t| ≤ f |g_y|. Under the same condition, a box that starts at rest stays at rest.""",
     ),
     "coulomb-turn": (
-        """The box lies flat and stays so, and its centre of mass does not move. Its four lower corners, not the face between
-them, touch the floor, each with a quarter of the weight; friction at each has the size f times this and acts against the corner's
-velocity, until the box stops.""",
+        """The box lies flat and stays flat, and its centre of mass does not move. Only its four lower corners touch the floor, not the
+face between them, and each corner carries a quarter of the weight. The friction at each corner is f times this load and opposes the
+velocity of the corner, until the box stops.""",
     ),
     "rolling": (
-        """The ball stays on the floor; its contact point, at r = [0, -radius, 0], has the velocity s = v + ω × r. Friction F
-acts there: M dv/dt = M g_t + F, dL/dt = r × F, with g_t the horizontal part of g. While s is not 0, F = -f M |g_y| s/|s|. From the
-time at which s is 0, the ball rolls without slip: F is what keeps s at 0. Nothing resists rolling or turning about the vertical.""",
+        """The ball stays on the floor. Its contact point, at r = [0, -radius, 0], has the velocity s = v + ω × r, and a friction force F
+acts there: M dv/dt = M g_t + F, dL/dt = r × F, where g_t is the horizontal part of g. While s is not 0, F = -f M |g_y| s/|s|. When s
+becomes 0, the ball rolls without slip from then on; F is then the force that keeps s at 0. Nothing resists rolling or a rotation about the
+vertical.""",
     ),
     "rough-contact": (
-        """One point of the body, at r from its centre of mass, touches the floor and does not slip: v = -ω × r. The floor
-exerts a force F on it, and no moment: M dv/dt = M g + F, dL/dt = r × F. A corner that touches the floor stays where it is. No other point
-touches the floor.""",
+        """One point of the body, at r from its centre of mass, touches the floor and does not slip: v = -ω × r. The floor exerts a force F
+and no moment at this point: M dv/dt = M g + F, dL/dt = r × F. If the point is a corner, it stays where it is. No other point touches the
+floor.""",
     ),
     "smooth-contact": (
-        """One point of the body, at r from its centre of mass, touches the floor and has no velocity along y: v_y = -(ω × r)_y.
-The floor exerts a vertical force F on it, and no moment: M dv/dt = M g + F, dL/dt = r × F. No other point touches the floor.""",
+        """One point of the body, at r from its centre of mass, touches the floor and has no velocity along y: v_y = -(ω × r)_y. The floor
+exerts a vertical force F and no moment at this point: M dv/dt = M g + F, dL/dt = r × F. No other point touches the floor.""",
     ),
 }
 """For the name of each exact solution, the laws of the motion; those that depend on the scene are added by `laws`."""
 
 KINDS = {
     "measured": "a recording, no exact solution",
-    "ball-impact": "closed form",
-    "bounce-ladder": "closed form",
-    "corner-impact": "elliptic functions; impact times by root finding",
-    "coulomb-slide": "closed form",
-    "coulomb-turn": "closed form",
-    "damped-free-rotor": "elliptic functions",
-    "damped-parabola": "closed form",
-    "edge-impact": "closed form; impact time by root finding",
-    "free-rotor": "elliptic functions",
-    "principal-spin": "closed form",
-    "rimless-wheel": "elliptic functions",
-    "rocking": "elliptic functions",
-    "rough-contact": "numerical integration",
-    "rolling": "closed form; numerical integration where the axis of rotation turns",
-    "slipping": "quadrature",
-    "smooth-contact": "numerical integration",
-    "tipping": "elliptic functions",
+    "ball-impact": "in closed form",
+    "bounce-ladder": "in closed form",
+    "corner-impact": "by elliptic functions, with impact times by root finding",
+    "coulomb-slide": "in closed form",
+    "coulomb-turn": "in closed form",
+    "damped-free-rotor": "by elliptic functions",
+    "damped-parabola": "in closed form",
+    "edge-impact": "in closed form, with the impact time by root finding",
+    "free-rotor": "by elliptic functions",
+    "principal-spin": "in closed form",
+    "rimless-wheel": "by elliptic functions",
+    "rocking": "by elliptic functions",
+    "rough-contact": "by numerical integration",
+    "rolling": "in closed form, and the orientation by numerical integration if the axis of rotation turns",
+    "slipping": "by quadrature",
+    "smooth-contact": "by numerical integration",
+    "tipping": "by elliptic functions",
 }
 """The kind of each exact solution, by its name."""
 
 
 MOST_POINTS = 100
 """Points that are printed."""
-WALLS = """An impact with a wall is one with the floor in axes whose y axis is the wall's normal n: the point that strikes is the one
-behind the wall, and e and the friction are the wall's."""
+WALLS = """The laws of an impact with the floor also hold for a wall, in axes whose y axis is the normal n of the wall. The point that
+strikes is the one that reaches the plane of the wall, and e and the friction are those of the wall."""
 
 
 def laws(scene, truth):
@@ -108,8 +110,7 @@ def laws(scene, truth):
     name = "" if truth is None else truth.name
     found = list(LAWS.get(name, ()) if truth else (IMPACT, SEVERAL))
     if scene.damping is not None:
-        linear, angular = number(scene.damping.linear), number(scene.damping.angular)
-        found.append(f"A medium resists in proportion to the velocities: dv/dt = g - {linear} v, dL/dt = -{angular} L.")
+        found.append(_damped(scene))
     if truth is None or name.endswith("-impact"):
         found.append({"none": SMOOTH, "infinite": STICKING}.get(scene.floor.friction, CONE))
     if name == "bounce-ladder":
@@ -119,18 +120,25 @@ def laws(scene, truth):
     return [" ".join(one.split()) for one in found]
 
 
+def _damped(scene):
+    """The law of flight in a viscous medium."""
+    linear, angular = (f"({number(rate)} s⁻¹)" if rate else "" for rate in (scene.damping.linear, scene.damping.angular))
+    velocity = f"g - {linear} v" if linear else "g"
+    return f"In flight, a viscous medium damps the motion: dv/dt = {velocity}, dL/dt = {f'-{angular} L' if angular else 0}."
+
+
 def _bounces(scene, truth):
     """The law of a body whose impacts do not change its rotation."""
     if truth.events[0].time == 0.0:
-        return "The floor carries the body and exerts no friction: x is constant, and the body turns about the vertical as a free body."
-    face = "" if scene.body.is_ball else "The four lower corners strike at once, so that the box stays flat. "
-    law = f"{face}Between impacts dv/dt = g. When the lowest point reaches the floor, v_y becomes -e v_y (Newton's restitution)."
+        return "The floor carries the body without friction: x is constant, and the body turns about the vertical at constant speed."
+    face = "" if scene.body.is_ball else "The four lower corners strike at the same time, so the box stays flat. "
+    law = f"{face}Between impacts, dv/dt = g. When the lowest point reaches the floor, v_y becomes -e v_y (Newton's restitution)."
     if scene.floor.rest_speed:
-        return f"{law} An impact slower than {number(scene.floor.rest_speed)} m/s has e = 0; after it the body lies still."
+        return f"{law} At an impact slower than {number(scene.floor.rest_speed)} m/s, e is 0; after it the body lies still."
     if scene.floor.restitution == 1.0:
         return law
-    return f"""{law} The impacts accumulate at t = t₁ + (2 |v₁|/|g_y|) e/(1 - e), with t₁ the time of the first and v₁ the velocity before
-        it; from then on the body lies still."""
+    return f"""{law} The times of the impacts converge to t = t₁ + (2 |v₁|/|g_y|) e/(1 - e), where t₁ is the time of the first impact and v₁
+        the velocity before it. From then on, the body lies still."""
 
 
 def statement(scene):
@@ -144,7 +152,7 @@ def statement(scene):
         ("ω", start.angular_velocity, "rad/s"),
     ):
         rows[f"{name} at t = 0"] = f"{vector(value)} {unit}".strip()
-    rows["gravity"] = "none" if scene.gravity is None else f"g = {vector(scene.gravity.acceleration)} m/s²"
+    rows["gravity"] = _gravity(scene)
     rows["floor"] = "none" if scene.floor is None else _floor(scene.floor)
     for number_of_wall, wall in enumerate(scene.wall or ()):
         surface = _floor(wall).partition(", fixed")[2]
@@ -157,6 +165,14 @@ def statement(scene):
     return rows
 
 
+def _gravity(scene):
+    if scene.gravity is None:
+        return "none (g = 0)"
+    gx, _, gz = scene.gravity.acceleration
+    slope = "; its horizontal part represents the slope of the floor" if scene.floor is not None and (gx or gz) else ""
+    return f"g = {vector(scene.gravity.acceleration)} m/s²{slope}"
+
+
 def _shape(body):
     if body.shape == "sphere":
         return f"ball of radius {number(body.radius)} m, centre of mass at its centre"
@@ -165,17 +181,17 @@ def _shape(body):
         return f"box with the half extents {vector(body.half_extents)} m along its axes, centre of mass {at}"
     count = f"{len(body.vertices)} points"
     if len(body.vertices) > MOST_POINTS:
-        return f"a mesh; planes touch its {count}, those of the file beside the scene's, taken from the centre of mass"
+        return f"a mesh of {count}: those in the file beside the scene file, from their centre of mass; only these points touch the planes"
     points = ", ".join(vector(point, computed) for point in body.vertices)
-    return f"the convex hull of {count}, given from the centre of mass [m]: {points}"
+    return f"the convex hull of {count}, whose positions relative to the centre of mass are, in m: {points}"
 
 
 def _inertia(body):
     tensor = body.inertia_tensor
     rows = vector(np.diag(tensor), computed) if is_diagonal(tensor) else ", ".join(vector(row, computed) for row in tensor)
-    about = "principal moments along the body's axes" if is_diagonal(tensor) else "tensor, by rows"
-    why = {"solid": "; homogeneous", "vertices": "; all mass in equal parts at the corners"}.get(
-        str(body.inertia), "; given, whatever the shape"
+    about = "principal moments about the axes of the body frame" if is_diagonal(tensor) else "tensor in the body frame, by rows"
+    why = {"solid": "; homogeneous body", "vertices": "; equal point masses at the corners"}.get(
+        str(body.inertia), "; given, not computed from the shape"
     )
     return f"{about}: {rows} kg m²{why}"
 
@@ -189,9 +205,9 @@ def _floor(floor):
 def _ensemble(scene):
     one = scene.ensemble
     return (
-        f"the scene also has {one.size} starts drawn with seed {one.seed}, with orientations uniform over all rotations, angular "
-        f"velocities uniform within ± {vector(one.angular_velocity)} rad/s of the start above, and the lowest point as high as in it; "
-        "this sheet is about the start above"
+        f"the scene also has {one.size} random initial states (seed {one.seed}): orientations are uniform over all rotations, angular "
+        f"velocities are uniform within ± {vector(one.angular_velocity)} rad/s of the ω above, and the lowest point is as high as in the "
+        "initial state above; this sheet solves only the initial state above"
     )
 
 

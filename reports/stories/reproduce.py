@@ -19,7 +19,7 @@ WORDS: dict[Status, str] = {"differs": "differs by", "error of the source": "err
 """The word before a difference, by status."""
 LEGEND = (
     "Reproduced: the value has the digits that the source prints. Within: it is within the bound or the tolerance that the source states, "
-    "and counts as reproduced. Error: that of the published value, beside the exact solution. For comparison: not in the source."
+    "and counts as reproduced. Error: the published value minus the exact one. For comparison: the source does not have this value."
 )
 
 

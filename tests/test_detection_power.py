@@ -17,7 +17,7 @@ FAULT = {fault.title: fault for fault in FAULTS}
     [
         ("gravity", "mujoco", "fall-spin"),
         ("restitution", "pybullet", "drop-ball-backspin"),
-        ("mass, inertia right", "mujoco", "tip-box"),
+        ("mass, with correct inertia", "mujoco", "tip-box"),
         ("moment of inertia about y", SEQUENTIAL, "spin-dzhanibekov"),
         ("initial angular velocity", "wang", "fall-spin"),
         ("linear damping", "mujoco", "fall-damped"),

@@ -128,7 +128,7 @@ FAULTS = (
     SizedFault("direction of gravity, of 1 rad", changed(with_tilt), ("fall-spin", "drop-ball")),
     SizedFault("restitution", changed(lambda s: with_restitution(lambda e: (1 + s) * e)), ("drop-ball", "drop-ball-lively")),
     SizedFault("Coulomb coefficient", changed(lambda s: with_coefficient(1 + s)), ("slide-box", "turn-box-rough")),
-    SizedFault("mass, inertia right", changed(lambda s: with_body(mass=1 + s)), ROLLS),
+    SizedFault("mass, with correct inertia", changed(lambda s: with_body(mass=1 + s)), ROLLS),
     SizedFault("inertia", changed(lambda s: with_body(moments=lambda m: (1 + s) * m)), ROLLS),
     SizedFault("moment of inertia about x", with_moment(0), TUMBLES),
     SizedFault("moment of inertia about y", with_moment(1), TUMBLES),

@@ -113,29 +113,41 @@ def test_height_of_the_first_contact_is_stated_only_if_it_is_wrong():
     ("title", "check", "message"),
     [
         (
-            "gravity acts twice in the first step",
+            "gravity acts twice in the first time step",
             "time",
             "velocity and position of a fall run ahead by 1 step: gravity acts in more steps than",
         ),
-        ("positions one step late", "time", "position is 1 step late: it does not belong to the time of its row"),
-        ("velocities one step late", "time", "velocity is 1 step late: it does not belong to the time of its row"),
-        ("time steps that jitter by 20 %", "time", "rows are not uniform in time"),
-        ("half precision once", "velocity lag", "gravity, the time step or the precision of the state is wrong"),
-        ("clock 0.1 % fast", "velocity lag", "gravity, the time step or the precision of the state is wrong"),
-        ("damping about one axis", "turning", "damping or a clamp that the scene does not have: the final angular velocity is "),
-        ("restitution that falls with the impact speed", "lively ball", "restitution is 0.9606 instead of 1 (3.9 % too low)"),
+        ("positions reported one time step late", "time", "position is 1 step late: it does not belong to the time of its row"),
+        ("velocities reported one time step late", "time", "velocity is 1 step late: it does not belong to the time of its row"),
+        ("time steps that vary at random by up to 20 %", "time", "rows are not uniform in time"),
         (
-            "friction doubled in the first impact",
+            "state rounded once to half precision, after 0.1 s",
+            "velocity lag",
+            "gravity, the time step or the precision of the state is wrong",
+        ),
+        ("time runs 0.1 % too fast", "velocity lag", "gravity, the time step or the precision of the state is wrong"),
+        (
+            "additional angular damping about one axis of the body",
+            "turning",
+            "damping or a clamp that the scene does not have: the final angular velocity is ",
+        ),
+        ("restitution of balls that decreases with the impact speed", "lively ball", "restitution is 0.9606 instead of 1 (3.9 % too low)"),
+        (
+            "friction on balls doubled in the first impact",
             "slippery floor",
             "the impulse of friction over that of the normal force is 0.24 instead of",
         ),
-        ("friction pyramid in impacts", "slippery floor", "friction acts 14° from its exact direction"),
         (
-            "impulse at another vertex",
+            "friction pyramid instead of the friction cone in impacts of balls",
+            "slippery floor",
+            "friction acts 14° from its exact direction",
+        ),
+        (
+            "impulse at another vertex than the one that strikes",
             "corner",
             "an impulse at the contact point does not explain the change of the velocities in the first contact",
         ),
-        ("velocity left from earlier simulations", "repeats", "keeps state between simulations"),
+        ("initial velocity 1 mm/s larger in each further simulation", "repeats", "keeps state between simulations"),
     ],
 )
 def test_fault_of_a_step_or_an_impact_is_named(title, check, message):

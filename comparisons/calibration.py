@@ -58,14 +58,14 @@ class Measured:
 
 @dataclass(frozen=True)
 class Calibration:
-    """The settings of an engine for a coefficient of restitution, and the results measured with them.
+    """The settings that give an engine a coefficient of restitution, and the results measured with them.
 
     Attributes:
         engine: The engine's label.
         settings: The settings that the engine is built with, by name.
-        reasons: The reason for each value, by the same names.
-        programs: Programs and models to paste, by language; `python` runs by itself.
-        measured: The measurements of that program.
+        reasons: The reason for the value of each setting, by name.
+        programs: Programs and models with these settings, as text by language; the text in `python` is a complete program.
+        measured: The results that the program in `python` gives.
     """
 
     engine: str

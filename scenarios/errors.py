@@ -10,11 +10,11 @@ from collections.abc import Collection, Iterable
 
 
 class DropspinError(Exception):
-    """Bad input. The message is one line with the place, the value given and the values allowed."""
+    """Raised for invalid input. The message is one line with the place, the given value and the allowed values."""
 
 
 class SceneError(DropspinError):
-    """A scene that cannot be loaded."""
+    """Raised if a scene cannot be loaded."""
 
 
 class SceneWarning(UserWarning):
@@ -22,12 +22,12 @@ class SceneWarning(UserWarning):
 
 
 class UnknownName(DropspinError):
-    """A name that is not in the list of known names.
+    """Raised for a name that is not in the list of known names.
 
     Args:
         what: The kind of thing that the name denotes, such as `engine`.
         given: The name.
-        known: All known names; the nearest one is suggested.
+        known: All known names; the message suggests the most similar one.
     """
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:

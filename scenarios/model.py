@@ -94,10 +94,10 @@ class Expectation(Table):
 
 
 class Scenario(Table):
-    """One scene, in SI units, y up.
+    """A scene, in SI units, with y up.
 
     Attributes:
-        name: The name of its file without the ending, or that of its mapping.
+        name: The name of the scene's file without the extension, or the name given in a mapping.
         origin: The argument of `load` that gave the scene; empty for a mapping.
         summary: A description in one line.
         source: The source of the problem or of its solution.
@@ -106,9 +106,9 @@ class Scenario(Table):
         body: Shape (`sphere`, `box` or `vertices`), size [m], mass [kg] and inertia [kg m²].
         start: Position [m], orientation, velocity [m/s] and angular velocity [rad/s] at t = 0, in the world frame.
         gravity: The acceleration of gravity [m/s²], or None.
-        floor: Restitution, friction and rest speed [m/s] of the plane y = 0, and where it ends, or None.
-        wall: The other planes, each with a point, a normal, restitution, friction and rest speed, or None; only beside a floor.
-        damping: Decay rates [1/s], or factors of a step, or None.
+        floor: The plane y = 0: restitution, friction, rest speed [m/s] and where it ends; None without a floor.
+        wall: Further planes, each with a point, a normal, restitution, friction and rest speed, or None; a scene with walls needs a floor.
+        damping: Decay rates [1/s] or factors per time step, or None.
         ensemble: The distribution of the initial states of an ensemble, or None.
         recording: The measured tosses with which motions are compared, or None.
         expect: Bounds on metrics, each with a reason.
@@ -184,7 +184,7 @@ class Scenario(Table):
 
     @property
     def initial_state(self) -> Array:
-        """The state at t = 0, shape (13,), in the layout of `dropspin.scenarios.state`."""
+        """The state at t = 0, shape (13,): position, orientation [x, y, z, w], velocity, angular velocity."""
         start = self.start
         return np.array([*start.position, *start.orientation, *start.velocity, *start.angular_velocity])
 
@@ -232,12 +232,12 @@ class Scenario(Table):
 
     @property
     def acceleration(self) -> Array:
-        """Gravity [m/s²], shape (3,); zero where the scene has none."""
+        """The acceleration of gravity [m/s²], shape (3,); zero if the scene has no gravity."""
         return np.zeros(3) if self.gravity is None else np.array(self.gravity.acceleration)
 
     @property
     def factor_dt(self) -> float:
-        """Time step [s] for which the factors of damping are given; 0 if rates are given, and without damping."""
+        """Time step [s] for which the damping factors are given; 0 if the scene gives decay rates, or has no damping."""
         return 0.0 if self.damping is None else self.damping.factor_dt or 0.0
 
     @property
@@ -248,7 +248,7 @@ class Scenario(Table):
 
     @property
     def digest(self) -> str:
-        """A short hash of everything that affects the motion: without texts, expectations and values that are the default."""
+        """A short hash of everything that affects the motion; texts, expectations and default values do not change it."""
         texts: dict[str, Any] = dict.fromkeys(("name", "summary", "source", "tags", "expect"), True)
         physics = self.model_dump_json(exclude=texts | {"body": set(self.body.arrays), "recording": True}, exclude_defaults=True)
         sha = hashlib.sha256(physics.encode())
@@ -260,13 +260,13 @@ class Scenario(Table):
 
     @property
     def structure(self) -> tuple[str | int | bool, ...]:
-        """All that is not a number: the kind of body, the number of vertices, the tables of the scene, and the kind of friction."""
+        """The non-numeric properties: the shape, the number of vertices, the tables of the scene, and the kind of friction."""
         frictions = [surface.friction if isinstance(surface.friction, str) else "coefficient" for surface in self.surfaces]
         ends = self.floor is not None and self.floor.ends
         return self.body.shape, len(self.body.vertices), self.gravity is None, self.damping is None, ends, *frictions
 
     def steps(self, dt: float) -> int:
-        """Number of whole steps of dt [s] that fit into the duration."""
+        """The number of whole time steps of dt [s] in the duration."""
         return math.floor(self.duration / dt + 1e-9)
 
     def starting_at(self, state: Array) -> "Scenario":

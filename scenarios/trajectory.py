@@ -23,7 +23,7 @@ class Trajectory:
         orientation: Unit quaternions [x, y, z, w], body to world, shape (n, 4).
         velocity: Velocity of the centre of mass [m/s], shape (n, 3).
         angular_velocity: Angular velocity [rad/s], shape (n, 3).
-        velocity_lag: Time by which velocities lag positions [s]: half a step under semi-implicit Euler, which is leapfrog.
+        velocity_lag: Time by which velocities lag positions [s]: half a time step under semi-implicit Euler, otherwise mostly 0.
     """
 
     t: Array
@@ -35,7 +35,7 @@ class Trajectory:
 
     @classmethod
     def from_states(cls, t: Array, states: Array, velocity_lag: float = 0.0) -> Self:
-        """A trajectory from rows of position, orientation, velocity, angular velocity, shape (n, 13), of which its parts are views."""
+        """A trajectory from states (position, orientation, velocity, angular velocity), shape (n, 13), without copying them."""
         motion = cls(t, states[:, POSITION], states[:, ORIENTATION], states[:, VELOCITY], states[:, SPIN], velocity_lag)
         vars(motion)["_states"] = states
         return motion
@@ -78,6 +78,6 @@ class Trajectory:
 
     @property
     def first_bad_row(self) -> int | None:
-        """The first row with a number that is not finite, or None."""
+        """The number of the first row with a value that is not finite, or None."""
         finite = np.isfinite(self.states)
         return None if finite.all() else int(np.argmin(finite.all(axis=1)))

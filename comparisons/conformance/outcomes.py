@@ -19,8 +19,8 @@ class CheckResult(NamedTuple):
     Attributes:
         check: Name of the check.
         outcome: `passed`, `failed`, `noted` for a peculiarity of the engine, `declined`, `crashed` or `timed_out`.
-        message: What was found, in words.
-        traceback: Of an exception of the adapter, if there was one.
+        message: The finding in words.
+        traceback: The traceback if the adapter raised an exception, else empty.
     """
 
     check: str

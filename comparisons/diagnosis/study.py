@@ -87,11 +87,11 @@ class BodyDiagnosis:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The findings on a model.
+    """The values and findings for the bodies of a model file.
 
     Attributes:
         file: The file as the user gave it.
-        bodies: Each body with each engine.
+        bodies: The values and findings for each body and engine.
     """
 
     file: str
@@ -99,7 +99,7 @@ class Diagnosis:
 
     @property
     def failed(self) -> bool:
-        """Whether something is impossible, or a target is missed."""
+        """Whether a body has an impossible inertia, or misses a target."""
         return any(finding.kind in ("impossible", "target") for body in self.bodies for _, finding in body.findings)
 
 
@@ -117,26 +117,26 @@ def diagnose(
     jobs: int | None = None,
     on_progress: Callable[[str, float], None] | None = None,
 ) -> Diagnosis:
-    """Measure what the settings of a model do to its bodies, against exact solutions.
+    """Measure how the settings of a model change the motion of its bodies, compared with exact solutions.
 
     Args:
         file: An MJCF or URDF file, or a mesh (OBJ, STL).
-        engines: `mujoco`, `pybullet`; by default those that read the file.
-        bodies: The names of bodies; by default all that are free.
-        on: The name of the geometry that they land on; by default the first plane or box that they collide with.
-        loose: Whether to cut links loose that move on joints.
+        engines: `mujoco` and `pybullet`, or one of them; by default, those that can read the file.
+        bodies: The names of bodies; by default, all free bodies.
+        on: The name of the geometry on which the bodies land; by default, the first plane or box with which they collide.
+        loose: Whether to diagnose also links that move on joints, without their joints.
         density: Density of a mesh [kg/m³].
         restitution: Target for the coefficient of restitution.
         friction: Target for the coefficient of friction.
         resources: The processor time [s] and memory [bytes] that one body may use.
         jobs: Number of bodies to diagnose at a time; by default, the number of processors.
-        on_progress: Called with what is being done and the share of the bodies that are done.
+        on_progress: Called with a description of the current work and the fraction of the bodies that are done.
 
     Returns:
-        The answers for each body and engine.
+        The values and findings for each body and engine.
 
     Raises:
-        DropspinError: The file is not a model, no engine reads it, or it has no such body.
+        DropspinError: The file is not a model, no engine can read it, or it has no body with a given name.
     """
     given, path, wanted = str(file), Path(file), [bodies] if isinstance(bodies, str) else list(bodies)
     ending = path.suffix.lower()

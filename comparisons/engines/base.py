@@ -20,15 +20,15 @@ MINOR = 0.01
 
 
 class EngineMissing(DropspinError):
-    """An engine whose package is not installed; the text says how to get it."""
+    """Raised if the package of an engine is not installed; the message says how to install it."""
 
 
 class EngineBroken(DropspinError):
-    """An installed engine that cannot be imported or constructed; the text says why, and how to repair it where that is known."""
+    """Raised if an installed engine cannot be imported or constructed; the message says why and, if known, how to repair it."""
 
 
 class Diverged(Exception):
-    """A simulation broke down; the text says at which step and why."""
+    """Raised if a simulation diverged; the message says at which time step and why."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class AsBuilt:
     """The body and gravity that an engine built, read back from it.
 
     Attributes:
-        mass: [kg].
-        inertia: About the centre of mass, in the body frame [kg m²], shape (3, 3).
-        gravity: [m/s²], shape (3,).
+        mass: Mass [kg].
+        inertia: Inertia tensor about the centre of mass, in the body frame [kg m²], shape (3, 3).
+        gravity: Acceleration of gravity [m/s²], shape (3,).
     """
 
     mass: float
@@ -50,9 +50,9 @@ class KnownLimitation(NamedTuple):
     """A known limitation of an engine that a simulation met.
 
     Attributes:
-        message: The limitation in a sentence, with the value it reached.
-        explained_errors: By metric, the largest error that it explains. A failed measurement within that is `limited` instead of failed;
-            all others are judged as usual.
+        message: A sentence that describes the limitation, with the value that exceeded it.
+        explained_errors: For each metric, the largest error that the limitation explains. A check that fails with an error up to this size
+            has the verdict `limited` instead of `failed`.
     """
 
     message: str
@@ -60,13 +60,13 @@ class KnownLimitation(NamedTuple):
 
     @property
     def is_minor(self) -> bool:
-        """Whether it explains only errors below 1 %; it is then reported only where it explains an error."""
+        """Whether the limitation explains only errors below 1 % of the scale; it is then reported only if a check is `limited`."""
         return bool(self.explained_errors) and max(self.explained_errors.values()) < MINOR
 
 
 @dataclass(frozen=True)
 class Engine(Configured, ABC):
-    """An engine with its options; `name` and `prepare` are required.
+    """An engine with its options. A subclass must define `name` and `prepare`.
 
     Attributes:
         options: The options that differ from the defaults.
@@ -74,72 +74,73 @@ class Engine(Configured, ABC):
 
     @abstractmethod
     def prepare(self, scene: Scenario, dt: float) -> "Simulation":
-        """Build a scene at a time step [s], start included."""
+        """Build the simulation of a scene with a time step [s], in the initial state of the scene."""
 
     def declines(self, scene: Scenario) -> str | None:
-        """Why a scene is not simulated: a limit of the engine, or of its adapter ("the adapter ..."); None if it is."""
+        """The reason why the engine does not simulate a scene ("the adapter ..." if the adapter is the reason); None if it does."""
         return None
 
     shapes: ClassVar[tuple[str, ...]] = ("sphere", "box", "vertices")
-    """The shapes of bodies that it builds on a floor; scenes with others are declined."""
+    """The shapes of bodies that the engine simulates with a floor; it declines a floor with any other shape."""
     takes_offsets: ClassVar[bool] = False
-    """Whether it builds a body on a floor whose centre of mass is not at the centre of its shape."""
+    """Whether the engine, with a floor, simulates bodies whose centre of mass is not at the centre of their shape."""
     takes_walls: ClassVar[bool] = False
-    """Whether it builds walls, and floors that end."""
+    """Whether the engine simulates walls, and floors that end."""
     order: ClassVar[float | None] = None
-    """Claimed order of accuracy in free flight; inf for exact, None for no claim."""
+    """Claimed order of accuracy in free flight; inf if the engine claims exact results, None if it makes no claim."""
     precision: ClassVar[type] = np.float64
     """The precision of the engine's state: numpy.float64 or numpy.float32."""
     compiles: ClassVar[bool] = False
-    """Whether the engine compiles when a scene is first simulated; compilation is then done and timed separately.
+    """Whether the engine compiles when it first simulates a scene; the time of compiling is then measured separately.
 
-    A batch may then differ from single simulations by rounding.
+    Results of a batch may then differ from those of single simulations by rounding errors.
     """
     mixes_scenes: ClassVar[bool] = False
-    """Whether the scenes of a batch may differ in all numbers (masses, sizes, gravity, floors), not only in their starts."""
+    """Whether the scenes of a batch may differ in all numbers (masses, sizes, gravity, floors), not only in their initial states."""
 
     @property
     def reasons(self) -> Mapping[str, str]:
-        """The reason for the value of each setting of a calibrated simulation, by the names in `Simulation.settings`."""
+        """For each setting in `Simulation.settings` with a calibrated value, the reason for this value."""
         return {name: setting.why for name, setting in self.settings.items() if setting.why}
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> "BatchSimulation | None":
-        """Build scenes that differ in their starts, or in other numbers if the engine `mixes_scenes`, and have as many steps.
+        """Build a batch of scenes with the same number of time steps, or return None if the engine cannot step them together.
 
-        None if the engine cannot step them together; single simulations then take the place of the batch.
+        The scenes differ in their initial states and, if `mixes_scenes` is true, in other numbers. If the result is None, dropspin
+        simulates the scenes one by one.
         """
         return None
 
     @property
     def steps_batches(self) -> bool:
-        """Whether the engine has batches at all."""
+        """Whether the engine can simulate batches."""
         return type(self).prepare_batch is not Engine.prepare_batch
 
     def order_in(self, scene: Scenario) -> float | None:
-        """The order claimed for a scene's errors: `order` in free flight, None with a floor."""
+        """The order of accuracy that the engine claims in a scene: by default `order` in free flight, and None with a floor."""
         return self.order if scene.floor is None else None
 
     def discretisation(self, scene: Scenario) -> str | None:
-        """The name of the discretisation of a scene's motion; None if it is not known.
+        """The name of the discretisation by which the engine simulates a scene; None if it is not known.
 
-        Two engines with the same discretisation make the same errors, so their agreement is no evidence that either is right.
+        Two engines with the same discretisation make the same errors, so their agreement is not evidence that either is correct.
         """
         return None
 
     def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
-        """The error of a metric that follows from the engine's scheme; None if it is not known."""
+        """The error of a metric that theory predicts for the engine's integration scheme; None if there is no prediction."""
         return None
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
-        """Programs and models with the settings of a scene at a time step [s], ready to paste, by language; may be empty.
+        """Programs and models that use the settings of a scene at a time step [s], as text by language; empty if there are none.
 
-        The one in `python` runs by itself, and has `motion(height, steps, step)`: heights of the body's lowest point [m] and vertical
-        speeds [m/s] after each step of a fall from that height.
+        The text in `python` is a complete program. Its function `motion(height, steps, step)` simulates a fall from a height, and returns
+        the height of the body's lowest point [m] and the vertical speed [m/s] after each time step.
         """
         return {}
 
     def refusal(self, scene: Scenario) -> str | None:
-        """Why a scene is not simulated, by the shape of its body or as `declines` says; None if it is."""
+        """The reason why a scene is not simulated, because of its shape, its walls or `declines`; None if it is simulated."""
         if scene.floor is not None and scene.body.shape not in self.shapes:
             return f"the adapter maps the shapes {', '.join(self.shapes)} onto a floor, not {scene.body.shape}"
         if scene.floor is not None and not self.takes_offsets and scene.body.shape not in ("vertices", "mesh") and scene.body.centre.any():
@@ -153,8 +154,10 @@ class _Stepped(ABC):
     """What simulations of one scene and of many have in common; a context manager.
 
     Attributes:
-        velocity_lag: Time by which velocity lags position [s]: half a step under semi-implicit Euler, 0 where both have the same time.
-        settings: The settings in force, versions included, stored with the results; values that JSON can hold.
+        velocity_lag: Time by which the velocity lags the position [s]: half a time step under semi-implicit Euler, 0 if both are at the
+            same time.
+        settings: The settings of the simulation, including versions. dropspin stores them with the results, so values must be of JSON
+            types.
     """
 
     velocity_lag: float = 0.0
@@ -162,14 +165,14 @@ class _Stepped(ABC):
 
     @abstractmethod
     def advance(self, steps: int) -> None:
-        """Take some native steps and nothing else: this is what is timed."""
+        """Take some time steps of the engine and do nothing else, because dropspin times this method."""
 
     def as_built(self) -> AsBuilt | None:
-        """What the engine built, read back from the engine itself; None if it cannot say."""
+        """The body and gravity, read back from the engine; None if the engine does not provide them."""
         return None
 
     def close(self) -> None:  # noqa: B027 - optional
-        """Release what the simulation holds."""
+        """Release the resources of the simulation."""
 
     def __enter__(self) -> Self:
         return self
@@ -179,21 +182,21 @@ class _Stepped(ABC):
 
 
 class Simulation(_Stepped):
-    """One scene at one time step, built and ready to step; `advance` and `state` are required.
+    """The simulation of one scene with one time step. A subclass must define `advance` and `state`.
 
     Attributes:
-        known_limitations: Known limitations of the engine that the simulation met: a sentence, which is reported, or a `KnownLimitation`,
-            which also explains errors.
+        known_limitations: The known limitations of the engine that the simulation met. Each is a sentence, which is reported, or a
+            `KnownLimitation`, which also states the errors that it explains.
     """
 
     known_limitations: Sequence[str | KnownLimitation] = ()
 
     @abstractmethod
     def state(self) -> Array:
-        """Position, orientation [x, y, z, w], velocity, angular velocity; all in the world frame, y up, shape (13,)."""
+        """Position, orientation [x, y, z, w], velocity and angular velocity, all in the world frame with y up, shape (13,)."""
 
     def record(self, steps: int, every: int = 1) -> Array:
-        """States now and after each `every` of `steps` steps, shape (1 + steps // every, 13)."""
+        """Take `steps` time steps; return the current state and that after each `every` steps, shape (1 + steps // every, 13)."""
         rows = np.empty((1 + steps // every, 13))
         rows[0] = self.state()
         for row in rows[1:]:
@@ -203,14 +206,14 @@ class Simulation(_Stepped):
 
 
 class BatchSimulation(_Stepped):
-    """Many scenes at one time step, stepped together by the engine; `advance` and `states` are required."""
+    """The simulation of many scenes that the engine steps together. A subclass must define `advance` and `states`."""
 
     @abstractmethod
     def states(self) -> Array:
-        """The state of each, as `Simulation.state` gives it, shape (size, 13); an array that NumPy or DLPack can read."""
+        """The state of each scene as in `Simulation.state`, shape (size, 13): a NumPy array, or one that NumPy or DLPack can read."""
 
     def record(self, steps: int, every: int = 1) -> Array:
-        """States now and after each `every` of `steps` steps, shape (size, 1 + steps // every, 13)."""
+        """Take `steps` time steps; return the current states and those after each `every` steps, shape (size, 1 + steps // every, 13)."""
         rows = [numpy_array(self.states()).astype(float)]
         for _ in range(steps // every):
             self.advance(every)
@@ -218,12 +221,12 @@ class BatchSimulation(_Stepped):
         return np.stack(rows, axis=1)
 
     def limitations_of(self, scene: Scenario, states: Array) -> Sequence[str | KnownLimitation]:
-        """The known limitations that one of the scenes met, as those of a `Simulation`, from its states after each step, shape (n, 13)."""
+        """The known limitations that a scene of the batch met, found from its states after each step, shape (n, 13)."""
         return ()
 
 
 class OneWorld(Simulation):
-    """A simulation of one scene by an engine that steps worlds together: a batch of one."""
+    """A simulation of one scene by an engine that steps many scenes together, as a batch of one scene."""
 
     def __init__(self, scene: Scenario, worlds: BatchSimulation) -> None:
         self.velocity_lag, self.settings = worlds.velocity_lag, worlds.settings

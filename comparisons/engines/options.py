@@ -17,9 +17,9 @@ class NumericOption(NamedTuple):
     """The default and the range of a numeric option.
 
     Attributes:
-        default: Its value where it is not given.
-        least: The least value allowed.
-        most: The largest value allowed.
+        default: The value if the option is not given.
+        least: The smallest allowed value.
+        most: The largest allowed value.
     """
 
     default: float
@@ -41,19 +41,20 @@ ELSEWHERE = {
 
 
 class Setting(NamedTuple):
-    """A documented setting of an engine's library, which the option of its name sets.
+    """A documented setting of an engine's library, which users change with the option of the same name.
 
     Attributes:
-        default: The library's own value: a number (a whole one is an `int`), numbers, off or on (a `bool`), or one of `values`.
+        default: The default of the library: a number (an `int` if it is an integer), several numbers, a `bool`, or one of `values`.
         what: A description in a few words.
-        calibrated: Its value in the calibrated profile; None if that is the library's own, or computed.
-        why: The reason for the value in the calibrated profile.
-        unit: Its unit.
-        least: The least value allowed.
-        most: The largest value allowed.
-        values: The words allowed; of two, the first means off.
-        is_computed: Whether the calibrated profile computes it from the scene and the time step.
-        needs: The options without which it has no effect, each with the value that it needs.
+        calibrated: The value with which dropspin makes the engine simulate scenes as specified (the calibrated value); None if it is the
+            default, or computed.
+        why: The reason for the calibrated value.
+        unit: The unit of the value.
+        least: The smallest allowed value.
+        most: The largest allowed value.
+        values: The allowed words; if there are two, the first means off.
+        is_computed: Whether the calibrated value is computed from the scene and the time step.
+        needs: Other options that must have a certain value for this setting to have an effect, with this value.
     """
 
     default: Value
@@ -69,7 +70,7 @@ class Setting(NamedTuple):
 
     @property
     def allowed(self) -> str:
-        """Its allowed values in words."""
+        """The allowed values in words."""
         if isinstance(self.default, bool):
             return "one of false, true"
         if self.values:
@@ -80,7 +81,7 @@ class Setting(NamedTuple):
         return number + from_to
 
     def parsed(self, text: str) -> Value | None:
-        """A value that is written as text, such as `0.02 1`; None if it is not allowed."""
+        """Convert a text, such as `0.02 1`, to the value of the setting; None if the value is not allowed."""
         switch = SWITCH.get(text.lower())
         if isinstance(self.default, bool):
             return None if switch is None else bool(switch)

@@ -29,11 +29,11 @@ A program that keeps its answer in a buffer waits for the next request, and drop
 
 
 class ProgramEngine(Engine):
-    """An engine that is a program; a subclass gives its `name` and `program`.
+    """An engine that runs as a separate program. A subclass must define `name` and `program`.
 
     Attributes:
         options: The options that differ from the defaults; a program has none unless the subclass declares `choices`.
-        program: The command and its arguments; those that are files beside the module of the class may be given by their names.
+        program: The command and its arguments. A file in the folder of the class's module can be given by its name alone.
     """
 
     program: ClassVar[Sequence[str]]

@@ -68,12 +68,12 @@ class ErrorBudget:
     Attributes:
         cause: The cause to which the error is attributed.
         reason: The reason for the cause.
-        asymptotic_error: The error that does not vanish as dt → 0, in the metric's unit; NaN where it is undefined.
+        asymptotic_error: The estimated error as dt → 0, in the metric's unit; NaN if the time steps do not determine it.
         lower: Lower end of the 95 % interval of the asymptotic error.
         upper: Upper end of the 95 % interval of the asymptotic error.
-        order: Observed order of convergence, fitted to the errors without the asymptotic error; NaN where there is none.
+        order: Observed order of accuracy, fitted to the errors minus the asymptotic error; NaN if it cannot be fitted.
         order_lower: Lower end of the order's 95 % interval.
-        order_upper: Upper end of the order's 95 % interval. Where the interval is wider than 2, the time steps do not determine the order.
+        order_upper: Upper end of the order's 95 % interval. If the interval is wider than 2, the time steps do not determine the order.
         dts: The time steps to which the order was fitted [s], coarsest first.
     """
 
@@ -125,18 +125,17 @@ def error_budget(
     """Estimate the asymptotic value, the order and the cause of one error.
 
     Args:
-        dts: Time steps [s], shape (n,), in any order. Of more than five usable ones, five are used: the finest, unless these span less
-            than a factor of 16; then those that are spaced most evenly.
-        errors: The error at each time step, shape (n,), in any unit, with its sign if it has one; NaN if the time step was too coarse to
+        dts: Time steps [s], shape (n,), in any order. If more than five are usable, the five smallest are used; if these span less than a
+            factor of 16, the five that are spaced most evenly.
+        errors: The error at each time step, shape (n,), in any unit, with its sign if it has one; NaN if the time step is too large to
             resolve it.
-        claimed_order: The order of accuracy claimed for the method; None or inf if there is none.
-        resolution: Standard deviation of the sampling noise of each error, shape (n,), or one for all; in the unit of the errors. 0 if the
-            error does not depend on where in a time step an impact falls. None if each error is from one start: a part of it may then be
-            proportional to the remainder of a time divided by the time step.
-        rounding: The largest error that rounding alone may cause at each time step, shape (n,), or at all of them; in the unit of the
-            errors.
-        signed: Whether the error can be negative; an error that cannot is treated as the norm of a signed error.
-        negligible: An asymptotic error up to this size is no model error; in the unit of the errors.
+        claimed_order: The order of accuracy that is claimed for the method; None or inf if no order is claimed.
+        resolution: Standard deviation of the sampling noise of each error, shape (n,), or one for all, in the unit of the errors. Use 0 if
+            the error does not depend on when within a time step an impact occurs. Use None if each error comes from a single initial state;
+            a part of the error may then depend on the time of the impact within a time step.
+        rounding: The largest error that rounding alone may cause at each time step, shape (n,), or one for all, in the unit of the errors.
+        signed: Whether the error can be negative; if not, it is treated as the norm of a signed error.
+        negligible: An asymptotic error up to this size does not count as a model error; in the unit of the errors.
         judged_together: The number n of errors that are judged together; the error probability of each is 1/n (C. E. Bonferroni, 1936).
 
     Returns:

@@ -99,13 +99,13 @@ class LogComparison:
 
     Attributes:
         tosses: Number of tosses.
-        length: The largest extent of the body along an axis of its frame [m], in which errors of position are given.
+        length: The largest extent of the body along an axis of its frame [m]. Position errors are given in units of this length.
         dt: Time step of the engines [s].
         errors: The errors of each engine.
         pairs: The differences between engines.
-        groups: By quantity, the largest groups of engines without significant differences; an engine may be in several.
-        parts: The parts of the errors.
-        left_out: By engine, why it has no errors.
+        groups: For each quantity, the largest groups of engines without significant differences; an engine may be in several groups.
+        parts: The parts into which the errors are decomposed.
+        left_out: The engines that have no errors, with the reason.
     """
 
     tosses: int
@@ -143,7 +143,7 @@ def log_compare(
     Args:
         recording: A recording, the path of its header, or the flights found in it.
         engines: One engine or several: engines, or names with options.
-        fit: Friction and restitution by engine, to find their part of an error.
+        fit: The result of `log_fit`, with which the part of the error that friction and restitution cause is computed.
         on_progress: Called with a description of the current work and the fraction of the engines that are done.
         resources: The processor time [s] and memory [bytes] that each piece of work may use.
         jobs: Number of engines at a time; by default, the number of processors that this process may use. It changes no result.

@@ -74,17 +74,18 @@ class Transfer:
 
 @dataclass(frozen=True)
 class LogFit:
-    """Friction and restitution by engine.
+    """The friction and restitution that each engine needs to continue the tosses of a recording.
 
     Attributes:
         tosses: Number of tosses.
-        frames: Number of frames of each after its flight.
+        frames: Number of frames of each toss after its flight that were used.
         estimates: The parameters of each engine.
-        transfers: The differences between two engines, of parameters that the tosses identify with both.
-        friction: The friction for any engine, with an interval that includes the differences between engines; None with
-            fewer than two engines that identify it.
-        discrepancies: By engine, what it leaves of these frames beside noise and errors of the start [m].
-        left_out: By engine, why it has no estimate.
+        transfers: The differences between two engines in a parameter, if the tosses determine the parameter with both engines.
+        friction: The coefficient of friction for any engine, with an interval that includes the differences between engines; None if the
+            tosses determine it with fewer than two engines.
+        discrepancies: For each engine, the remaining difference from these frames that neither noise nor errors of the initial state
+            explain [m].
+        left_out: The engines that have no estimate, with the reason.
     """
 
     tosses: int

@@ -95,15 +95,15 @@ class Header(Table):
 
 @dataclass(frozen=True, eq=False)
 class Toss:
-    """One throw of a body, in SI units, y up, the floor at y = 0.
+    """One throw of a body, in SI units, with y up and the floor at y = 0.
 
     Attributes:
         name: The value of the column `toss`.
-        t: Times from that of the first frame [s], shape (n,).
-        position: The tracked point [m], shape (n, 3).
+        t: Times since the first frame [s], shape (n,).
+        position: Position of the tracked point [m], shape (n, 3).
         orientation: Unit quaternions [x, y, z, w], body to world, without jumps of sign, shape (n, 4).
-        velocity: Of the tracked point [m/s], shape (n, 3), or None.
-        angular_velocity: In the world frame [rad/s], shape (n, 3), or None.
+        velocity: Velocity of the tracked point [m/s], shape (n, 3), or None if it was not recorded.
+        angular_velocity: Angular velocity in the world frame [rad/s], shape (n, 3), or None if it was not recorded.
     """
 
     name: str
@@ -158,13 +158,13 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A recording.
+    """A recording of a body's motion, in SI units.
 
     Attributes:
-        header: What its header says.
-        tosses: In the order of the file.
+        header: The content of the header file.
+        tosses: The tosses, in the order of the file.
         origin: The argument of `load_log`.
-        irregularities: What the file shows by itself: numbers of rows or of frames, the step that differs most [s], or a rate [1/s].
+        irregularities: Irregularities of the file, such as repeated rows, missing frames, uneven times or another frame rate.
     """
 
     header: Header

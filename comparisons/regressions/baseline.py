@@ -110,10 +110,10 @@ class Baseline:
     """Accepted results.
 
     Attributes:
-        acceptances: Acceptances by key.
-        engines: The name by which an engine is run, if it differs from the label, such as `my_module:MyEngine`.
-        scenes: The hash of what each scene simulates.
-        motions: By the key of an acceptance: by scene, engine and time step, the hash of the motions from which its results were measured.
+        acceptances: The acceptances by key, each with its date, reason and versions.
+        engines: By label, the name by which an engine is run, such as `my_module:MyEngine`, if it differs from the label.
+        scenes: For each scene, the hash of everything that affects its motion.
+        motions: For each acceptance, scene, engine and time step, the hash of the motions from which the results were computed.
         results: The table that `comparable_results` returns, with two more columns: `by` is the key of the acceptance; if `known_failure`
             is true, a failed check of this result does not fail the run unless the result is worse than accepted.
     """

@@ -61,19 +61,19 @@ class Status(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """A run.
+    """The results of a run.
 
     Attributes:
-        table: One row per measurement, with the columns of `Measurement`; dt and time_per_step in s. A row without a metric has the outcome
-            of an engine without a motion, or a remark.
+        table: One row per measurement, with the columns of `Measurement`. A row without a metric has the outcome of an engine that has no
+            motion, or a remark.
         scenes: The scenes, by name, in the order they were run.
         engines: The engines' labels, in order.
-        trajectories: By (scene, engine, dt): the motion from the scene's own start, every step.
-        ensembles: By (scene, engine, dt): the results of each start, if the scene has an ensemble.
-        provenance: The arguments of the run, versions, machine, settings per engine and scene, and the hash of its motions per scene
-            and time step.
-        predictions: The errors that theory predicts for an engine's method, with the same columns; few scenes and methods have any.
-        agreements: The differences between each two engines, with the same columns; `truth` has the label of the other engine.
+        trajectories: For each key (scene, engine, dt), the motion from the initial state of the scene, with every time step.
+        ensembles: For each key (scene, engine, dt), the results of each initial state, if the scene has an ensemble.
+        provenance: The arguments of the run, the versions, the machine, the settings of each engine in each scene, and the hashes of the
+            motions.
+        predictions: The errors that theory predicts, with the same columns as `table`; only few scenes and methods have a prediction.
+        agreements: The differences between each two engines, with the same columns as `table`; `truth` has the label of the other engine.
     """
 
     table: pd.DataFrame
@@ -132,7 +132,7 @@ class Results:
         """The status of each engine in each scene.
 
         Returns:
-            By scene and engine: the worst verdict, and the reason of its outcome.
+            For each scene and engine, the worst verdict and its reason.
         """
         table, verdicts = self.table, self.table["verdict"]
         is_small = (verdicts == "known") & ~(table["value"].abs() > SMALLEST_STATED)
@@ -156,9 +156,9 @@ class Results:
     def leading_errors(self, scene: str) -> pd.DataFrame:
         """The errors of all engines in one metric of a scene, at the finest time step.
 
-        The metric is the one with the largest error, relative to its scale, that is a known fault or limitation or that fails, so that
-        the errors show what the statuses are about. Where no engine has such an error, it is the leading metric of the scene, such as
-        the bounce height.
+        If checks fail, or errors are known faults or limitations, the metric is that of the largest of these errors, relative to its scale.
+        Otherwise it is the metric by which the scene is summarised: bounce height if it applies, else orientation if the body rotates,
+        else position.
 
         Args:
             scene: Name of the scene.
@@ -194,20 +194,20 @@ class Results:
 
     @property
     def measurements(self) -> pd.DataFrame:
-        """The rows that compare an engine with exact solutions, recordings and conservation laws, at one time step each."""
+        """The rows that compare an engine at a single time step with an exact solution, a recording or a conservation law."""
         return self.table[self.table["kind"].isin(["truth", "invariant"])]
 
     def asymptotic_errors(self, *causes: str) -> pd.DataFrame:
-        """The rows of asymptotic errors with some causes.
+        """The rows of the asymptotic errors that have one of the given causes.
 
         Args:
-            causes: Such as `model` or `setting`.
+            causes: The causes, such as `model` or `setting`.
         """
         return self.table[(self.table["kind"] == "asymptotic_error") & self.table["cause"].isin(causes)]
 
     @property
     def breakdowns(self) -> "pd.Series[bool]":
-        """For each row, whether an engine broke down, or is missing though it was named."""
+        """For each row of `table`, whether the engine crashed, timed out or diverged, or was requested by name and is not installed."""
         verdicts = self.table["verdict"]
         return verdicts.isin(BREAKDOWNS) | ((verdicts == "missing") & self.table["engine"].isin(self.provenance.get("named", [])))
 
@@ -217,7 +217,7 @@ class Results:
         return bool(self.provenance["asked"].get("quick"))
 
     def exit_code(self) -> int:
-        """0: nothing failed; 1: a verdict failed; 3: an engine broke down, or is missing though it was named."""
+        """0: nothing failed; 1: a check failed; 3: an engine broke down, or was requested by name and is not installed."""
         return 3 if self.breakdowns.any() else int(self.table["verdict"].isin(FAILURES).any())
 
 

@@ -42,28 +42,28 @@ OF_SYMMETRIES = ("symmetry", "determinism")
 
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """A measurement, or the outcome of an engine that has none.
+    """A row of the results: a measured value with its verdict, or the outcome of an engine that has no motion.
 
     Attributes:
         scene: Name of the scene.
         engine: Label of the engine.
         dt: Time step [s]; NaN for results of several time steps.
-        seed: Number of the start, for sweeps; 0 in a run.
-        metric: Name of the metric, or of the symmetry; empty in a row about an engine, without a value.
+        seed: Number of the initial state, for sweeps; 0 in a run.
+        metric: Name of the metric or the symmetry; empty in a row that has only the outcome of an engine.
         value: The value, in `unit`.
         unit: SI unit; '1' for a ratio.
         kind: What the value is compared with.
-        truth: Name of the exact solution, or `measured`; for an agreement the other engine's label; for `other_law` the impact law; for
-            `setting` the settings of which the value is the share of the error.
-        lower: Least value allowed, or the lower end of the 95 % interval of an order or an asymptotic error; NaN where there is none.
-        upper: Largest value allowed, or the upper end of that interval; NaN where there is none.
-        tolerance: How far the value may move between two runs before it counts as changed, in `unit`; NaN where it is not compared.
+        truth: Name of the exact solution, or `measured` for a recording. If `kind` is `agreement`, the label of the other engine; if it is
+            `other_law`, the impact law; if it is `setting`, the settings whose share of the error is the value.
+        lower: Smallest allowed value, or the lower end of the 95 % interval of an order or an asymptotic error; NaN if there is neither.
+        upper: Largest allowed value, or the upper end of the 95 % interval; NaN if there is neither.
+        tolerance: The change of the value between two runs up to which it counts as unchanged, in `unit`; NaN if it is not compared.
         verdict: The verdict.
-        cause: What the error is attributed to.
-        reason: Why, in words.
-        basis: What the verdict is based on, beside value and bounds.
-        time_per_step: Wall time of a native step [s].
-        steps: How many steps were taken.
+        cause: The cause to which the error is attributed, such as `discretisation` or `model`.
+        reason: The reason for the verdict and the cause, in words.
+        basis: The information on which the verdict is based, besides value and bounds.
+        time_per_step: Wall time of a time step of the engine [s].
+        steps: Number of time steps taken.
     """
 
     scene: str

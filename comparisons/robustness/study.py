@@ -99,10 +99,11 @@ class RobustnessStudy:
     Attributes:
         scene: The scene.
         dt: The time step, if it is not varied [s].
-        within: The largest error that counts as accurate: a ratio, or an angle in radians.
+        within: The largest error that counts as accurate: relative to the scale of the metric, or in rad for an angle.
         scans: The scans of each engine along each axis.
-        left_out: Engines that do not run the scene, with the reason.
-        refinements: For each other engine, the diagnosis at the nominal time step, and, if it is not sound there, at smaller time steps.
+        left_out: The engines that do not run the scene, with the reason.
+        refinements: For each engine that runs the scene, its failure mode at the nominal time step and, if the run is not sound, at smaller
+            time steps.
     """
 
     scene: Scenario
@@ -113,12 +114,12 @@ class RobustnessStudy:
     refinements: dict[str, tuple[ScanPoint, ...]]
 
     def steps(self, engine: str) -> tuple[ScanPoint, ...]:
-        """The diagnoses of an engine at each time step tried, in the order of the time steps."""
+        """The failure mode of an engine at each tested time step, in the order of the time steps."""
         scanned = (scan.points for scan in self.scans if scan.axis.name == "step" and scan.engine == engine)
         return next(scanned, tuple(reversed(self.refinements.get(engine, ()))))
 
     def largest_steps(self, engine: str) -> tuple[float | None, float | None]:
-        """The largest tested time steps up to which an engine is accurate, and stable [s]; None if there is none."""
+        """The largest tested time step up to which an engine is accurate, and that up to which it is stable [s]; None if there is none."""
         points = self.steps(engine)
         return _last_in_a_row(points, ACCURATE), _last_in_a_row(points, STABLE)
 
@@ -144,10 +145,11 @@ def find_limits(
 
     Args:
         scene: A scene, its catalogue name, the path of its file, or a mapping with the same keys.
-        engines: One engine or several: engines, or names with options; by default methods that give different results for such scenes.
-        axes: Names of axes, such as `step`, `spin` or `mass`; by default all that the scene has.
-        dt: Time step, if it is not varied [s].
-        within: The largest error that counts as accurate: a ratio, or an angle in radians.
+        engines: One engine or several: engines, or names with options; by default, several methods that give different results in this
+            scene.
+        axes: Names of the quantities to vary, such as `step`, `spin` or `mass`; by default, all that the scene has.
+        dt: Time step [s], unless it is varied.
+        within: The largest error that counts as accurate: relative to the scale of the metric, or in rad for an angle.
         on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1, in any
             thread, but in one at a time.
         resources: The processor time [s] and memory [bytes] that an engine may use for one tested value.
@@ -157,7 +159,7 @@ def find_limits(
         For each engine and axis, the ranges in which the engine is accurate and stable, and its failure modes outside them.
 
     Raises:
-        DropspinError: An engine or an axis does not exist, or the scene does not have the axis.
+        DropspinError: An engine or an axis does not exist, or the scene does not have the quantity of an axis.
     """
     scene = as_scene(scene)
     verify_time_step(scene, dt)

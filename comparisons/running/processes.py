@@ -48,11 +48,11 @@ class ResourceLimits:
     """The processor time and memory that an engine may use for one scene at one time step, including start phases and ensemble.
 
     Attributes:
-        processor_time: Processor time [s]; ten times as much wall time is allowed.
-        memory: Memory beyond what its process takes when it starts [bytes].
+        processor_time: Processor time [s]. The wall time may be ten times as long.
+        memory: Memory [bytes] in addition to that of the process at its start.
 
     Raises:
-        DropspinError: One of them is not above 0, or larger than a system can count.
+        DropspinError: A limit is not positive, or too large for the system.
     """
 
     processor_time: float = 300.0

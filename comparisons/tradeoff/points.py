@@ -89,7 +89,7 @@ class TradeOff:
         ladders: The time steps tried for every requested engine, and the reason why no smaller one was tried.
         worlds: The numbers of worlds in a batch.
         memory_per_world: By engine, the memory that the largest batch takes per world [bytes]; empty below 1,024 worlds.
-        load: Threads per processor that were running or waiting for one beside the timed one, on average; NaN if not known.
+        load: Average number of threads per processor that ran or waited for a processor, besides the timed one; NaN if not known.
     """
 
     scene: Scenario
@@ -102,12 +102,12 @@ class TradeOff:
 
     @property
     def spread(self) -> float:
-        """The median of the spreads of all configurations."""
+        """The median, over all configurations, of the spread of the timings: the median timing divided by the smallest."""
         return float(np.median([spread(point.cost) for point in self.points]))
 
     @property
     def left_out(self) -> dict[str, str]:
-        """Engines without configurations, with the reason."""
+        """The engines that are left out of the comparison, with the reason."""
         return {ladder.engine: ladder.left_out for ladder in self.ladders if ladder.left_out}
 
     @property
@@ -117,7 +117,7 @@ class TradeOff:
 
     @property
     def undecided(self) -> list[CostPoint]:
-        """The configurations that are on the Pareto front or not, depending on which of the rounds' costs is taken; cheapest first."""
+        """The configurations for which the smallest, median and upper-quartile costs disagree on the Pareto front; cheapest first."""
         costs = [lambda point, share=share: float(np.quantile(point.cost, share)) for share in (0.0, 0.5, 0.75)]
         fronts = [frozenset(_pareto_front(self.points, cost)) for cost in costs]
         differing = frozenset().union(*fronts) - fronts[0].intersection(*fronts)
@@ -130,7 +130,7 @@ class TradeOff:
 
     @property
     def dominated(self) -> dict[CostPoint, CostPoint]:
-        """For each engine that is not on the Pareto front, its most accurate configuration and the cheapest one that is as accurate."""
+        """For each engine that is not on the Pareto front, its most accurate configuration and the cheapest one at least as accurate."""
         front = self.pareto_front
         best = {point.engine: point for point in sorted(self.points, key=lambda point: point.error, reverse=True)}
         on_front = {point.engine for point in front}
@@ -143,8 +143,8 @@ class TradeOff:
         Args:
             within: The tolerance, in the metric's unit.
 
-        A time step counts only if all finer ones of the engine are within the tolerance too; at a coarser one the error may be small by
-        chance, where it crosses 0.
+        A time step counts only if the errors at all smaller time steps of the engine are also within the tolerance. Otherwise its error may
+        be small by chance, because it changes sign near this time step.
         """
         cheapest = {point.engine: point for point in sorted(self._within(within), key=lambda point: point.typical_cost, reverse=True)}
         if not cheapest:
@@ -158,7 +158,7 @@ class TradeOff:
         return Recommendation(within, best, others[0], ratio, level)
 
     def best_in_batch(self, within: float, worlds: int) -> CostPoint | None:
-        """The configuration with the smallest cost per world within a tolerance; None if no engine that can simulate batches reaches it.
+        """The configuration with the smallest cost per world within a tolerance; None if no engine with batches reaches the tolerance.
 
         Args:
             within: The tolerance, in the metric's unit.

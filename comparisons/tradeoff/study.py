@@ -61,12 +61,14 @@ def tradeoff(
     resources: ResourceLimits = FIVE_MINUTES,
     jobs: int | None = None,
 ) -> TradeOff:
-    """Measure error and cost of engines over a ladder of time steps.
+    """Measure error and cost of engines at a sequence of ever smaller time steps.
 
     Args:
         scene: A scene with an exact solution, its catalogue name, the path of its file, or a mapping with the same keys.
-        engines: One engine or several: engines, or names with options; by default methods that give different results for such scenes.
-        metric: The metric of the error; by default the scene's leading metric.
+        engines: One engine or several: engines, or names with options; by default, several methods that give different results in this
+            scene.
+        metric: The metric of the error; by default, the one by which the scene is summarised: bounce height if it applies, else orientation
+            if the body rotates, else position.
         budget: Processor time for measuring the errors of each engine at all time steps [s]; once it is used up, no smaller time step is
             tried.
         worlds: The numbers of worlds in the batches to time, for engines that step many worlds together.
@@ -80,8 +82,8 @@ def tradeoff(
         The error of each engine at each time step and its cost, in seconds per simulated second, with the Pareto front.
 
     Raises:
-        DropspinError: The scene has no exact solution, or the metric does not apply to it; the budget or a number of worlds is not above 0;
-            or, as its subclass NotCompared, no engine can be compared in the scene.
+        DropspinError: The scene has no exact solution, the metric does not apply to it, the budget or a number of worlds is not above 0, or
+            no engine can be compared in the scene (the subclass NotCompared).
     """
     sizes = tuple(sorted(set(worlds)))
     if not all(isinstance(size, int) and 0 < size <= MOST_WORLDS for size in sizes):

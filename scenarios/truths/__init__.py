@@ -53,11 +53,11 @@ def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
     Args:
         scene: The scene.
         law: An impact law to use instead of that of the floor, for balls and for bodies that strike with a corner or an edge. An engine
-            that implements
-            this law must converge to this solution.
+            that implements this law converges to the returned solution.
 
     Returns:
-        A callable of times [s] that returns a `Trajectory`, with the impacts in `events` and the end of its validity in `horizon`.
+        A function of times [s] that returns a `Trajectory`. Its attribute `events` has the impacts, and `horizon` the time up to which it
+        is valid.
 
     Raises:
         DropspinError: The argument is not a `Scenario`.

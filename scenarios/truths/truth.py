@@ -47,13 +47,13 @@ class Truth:
     """The exact motion of a scene, or a measured one.
 
     Attributes:
-        name: Short name, which is also in the column `truth` of the results.
-        statement: The formula and its source, one sentence.
-        states: Function of times, shape (n,), that returns states, shape (n, 13).
+        name: Short name, as in the column `truth` of the results.
+        statement: A sentence with the formula and its source.
+        states: Function that returns the states, shape (n, 13), at times of shape (n,).
         events: The impacts within the scene's duration, in order.
-        horizon: Time up to which the formula is valid [s].
-        ends: Why it is not valid after the horizon, if the horizon is before the end of the scene.
-        frames: The times at which a measured motion is known [s], shape (n,); None for an exact one, which is known at all times.
+        horizon: Time up to which the solution is valid [s].
+        ends: The reason why the solution is not valid after the horizon, if the horizon is before the end of the scene.
+        frames: The times at which a measured motion is known [s], shape (n,); None for an exact solution, which is known at all times.
     """
 
     name: str
@@ -66,24 +66,24 @@ class Truth:
 
     @property
     def is_exact(self) -> bool:
-        """Whether it is an exact solution instead of a measured motion."""
+        """Whether the motion is an exact solution, not a measured one."""
         return self.frames is None
 
     @property
     def word(self) -> str:
-        """`exact solution` or `recording`, for texts."""
+        """The word for the motion in texts: `exact solution` or `recording`."""
         return EXACT if self.is_exact else RECORDED
 
     def covers(self, t: Array) -> NDArray[np.bool_]:
-        """Mask of the times [s] up to the horizon, with a margin, because rounding of n dt may exceed the horizon."""
+        """For each time [s], whether it is at most the horizon; with a margin for the rounding of n dt."""
         return t <= self.horizon * (1.0 + 1e-9)
 
     def covers_all(self, duration: float) -> bool:
-        """Whether the formula is valid for a whole scene of this duration [s]."""
+        """Whether the solution is valid for the whole of a scene with this duration [s]."""
         return bool(self.covers(np.array([duration]))[0])
 
     def after(self, delay: float) -> "Truth":
-        """The motion that starts at the time `delay` [s], which must not be after the first impact."""
+        """The same motion with its time origin at `delay` [s], which must not be after the first impact."""
         later = tuple(replace(event, time=event.time - delay) for event in self.events)
         frames = None if self.frames is None else self.frames - delay
         return replace(self, states=lambda t: self.states(t + delay), events=later, horizon=self.horizon - delay, frames=frames)

@@ -80,21 +80,21 @@ KINDS = {
     "measured": "a recording, no exact solution",
     "ball-impact": "in closed form",
     "bounce-ladder": "in closed form",
-    "corner-impact": "by elliptic functions, with impact times by root finding",
+    "corner-impact": "with elliptic functions, and the impact times by root finding",
     "coulomb-slide": "in closed form",
     "coulomb-turn": "in closed form",
-    "damped-free-rotor": "by elliptic functions",
+    "damped-free-rotor": "with elliptic functions",
     "damped-parabola": "in closed form",
-    "edge-impact": "in closed form, with the impact time by root finding",
-    "free-rotor": "by elliptic functions",
+    "edge-impact": "in closed form, and the impact time by root finding",
+    "free-rotor": "with elliptic functions",
     "principal-spin": "in closed form",
-    "rimless-wheel": "by elliptic functions",
-    "rocking": "by elliptic functions",
+    "rimless-wheel": "with elliptic functions",
+    "rocking": "with elliptic functions",
     "rough-contact": "by numerical integration",
     "rolling": "in closed form, and the orientation by numerical integration if the axis of rotation turns",
     "slipping": "by quadrature",
     "smooth-contact": "by numerical integration",
-    "tipping": "by elliptic functions",
+    "tipping": "with elliptic functions",
 }
 """The kind of each exact solution, by its name."""
 
@@ -181,7 +181,8 @@ def _shape(body):
         return f"box with the half extents {vector(body.half_extents)} m along its axes, centre of mass {at}"
     count = f"{len(body.vertices)} points"
     if len(body.vertices) > MOST_POINTS:
-        return f"a mesh of {count}: those in the file beside the scene file, from their centre of mass; only these points touch the planes"
+        given = "given in the file beside the scene file, here relative to their centre of mass"
+        return f"a mesh of {count}, {given}; only these points touch the planes"
     points = ", ".join(vector(point, computed) for point in body.vertices)
     return f"the convex hull of {count}, whose positions relative to the centre of mass are, in m: {points}"
 

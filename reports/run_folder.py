@@ -28,7 +28,7 @@ PLOT_FILES = ("svg", "png", "pdf", "csv")
 
 
 def write_report(results: Results, folder: str | Path, sections: Sequence[Document] = ()) -> Path:
-    """Write a run: its data and the reports. An earlier run in the same folder is replaced.
+    """Write the data and the reports of a run to a folder. An earlier run in the same folder is replaced.
 
     Args:
         results: The run.
@@ -39,7 +39,7 @@ def write_report(results: Results, folder: str | Path, sections: Sequence[Docume
         The path of report.html.
 
     Raises:
-        DropspinError: The folder holds files that are not of a run, or cannot be written.
+        DropspinError: The folder has files that do not belong to a run, or cannot be written.
     """
     with run_folder(folder) as unfinished:
         fill(results, unfinished, sections)

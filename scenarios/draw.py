@@ -62,19 +62,20 @@ MOST_DRAWS = 1000  # of one scene; a dozen are usual
 
 
 def draw(count: int, seed: int) -> list[Scenario]:
-    """Draw scenes at random; each has an exact solution for its whole duration.
+    """Generate random scenes; each has an exact solution for its whole duration.
 
-    Scene k depends on the seed and on k only. Its name, such as `draw-7-012` for scene 12 of seed 7, loads it again.
+    Scene k depends only on the seed and on k. `load` accepts its name, such as `draw-7-012` for scene 12 of seed 7.
 
     Args:
         count: Number of scenes, from 1 to 1000.
         seed: Seed, from 0 to 2⁶⁴ - 1. The same seed gives the same scenes with the same versions of dropspin and NumPy.
 
     Returns:
-        The scenes: of each fifteen, ten are numbered from 1, and five, of round bodies, meshes and walls, from 1001.
+        The scenes. Of each fifteen scenes, ten are numbered from 1; the other five, with round bodies, meshes or walls, are numbered from
+        1001.
 
     Raises:
-        DropspinError: Count or seed are out of range.
+        DropspinError: The count or the seed is out of range.
     """
     for name, number, least, most in (("count", count, 1, MOST_SCENES), ("seed", seed, 0, LARGEST_SEED)):
         if isinstance(number, bool) or not isinstance(number, int) or not least <= number <= most:

@@ -52,7 +52,7 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
             with the same keys. A mapping may have arrays instead of lists, and a key `name`, which is `scene` by default.
 
     Returns:
-        The scene; all values are in SI units. A warning is given of values that are possible, but probably not meant.
+        The scene; all values are in SI units. Python warns of values that are valid but probably not intended.
 
     Raises:
         SceneError: The scene is not valid. The message gives the file or mapping, the key, the value and the allowed values.

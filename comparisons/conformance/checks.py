@@ -54,12 +54,12 @@ def conform(
         on_result: Called with the outcome of each check as soon as it is known.
 
     Returns:
-        The outcome of each check, in order; an engine that crashes or hangs fails the check alone.
+        The outcome of each check, in order. If the engine crashes or hangs, only the current check fails.
 
     Raises:
         UnknownName: There is no such check.
         EngineMissing: The engine is not installed.
-        EngineBroken: It cannot be imported or constructed.
+        EngineBroken: The engine cannot be imported or constructed.
     """
     verify_known("check", checks, CHECKS)
     entry, results = present_entry(engine), []

@@ -76,28 +76,28 @@ MOVED = frozenset({"scenarios", "reference_impl", "comparisons", "reports"})
 
 
 def engine_names() -> list[str]:
-    """All engine names, installed or not.
+    """The names of all engines, installed or not.
 
     Returns:
-        The built-in ones, then those that other packages register.
+        The names of the built-in engines, then of those that other packages register.
     """
     return [*BUILT_IN, *sorted(_entry_points())]
 
 
 def engine(name: str) -> Engine:
-    """The engine of a name with options, such as `mujoco[integrator=rk4]`, or of a class, such as `my_module:MyEngine`.
+    """The engine with a name and options, such as `mujoco[integrator=rk4]`, or of a class, such as `my_module:MyEngine`.
 
     Args:
-        name: The name; `dropspin list engines` lists the engines, and `dropspin show NAME` the options of one.
+        name: The name. `dropspin list engines` lists the engines, and `dropspin show NAME` the options of an engine.
 
     Returns:
         The engine, with its options.
 
     Raises:
         UnknownName: There is no such engine, option or value.
-        EngineMissing: A package it needs is not installed; the text says how to get it.
-        EngineBroken: It cannot be imported or constructed.
-        DropspinError: It is not an engine.
+        EngineMissing: A package that the engine needs is not installed; the message says how to install it.
+        EngineBroken: The engine cannot be imported or constructed.
+        DropspinError: The class is not an engine.
     """
     return constructed(*parsed(name))
 

@@ -74,7 +74,7 @@ class TossFacts:
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """Values, findings and a line for each toss, by the flights that were found."""
+    """The result of `log_check`: values, findings and properties of each toss, from the flights found in a recording."""
 
     values: tuple[Value, ...]
     findings: tuple[Finding, ...]
@@ -98,16 +98,16 @@ class Check:
 
 
 def log_check(recording: Flights | Log | str | Path) -> Check:
-    """Compare the header of a recording with its flights, and with the body at rest.
+    """Check the header of a recording against the flights in it, and against the frames in which the body is at rest.
 
     Args:
-        recording: The recording, what `load_log` takes, or the flights found in it.
+        recording: The recording, an argument of `load_log`, or the flights found in a recording.
 
     Returns:
-        Its values with their intervals, its findings, and its tosses.
+        The measured values with their intervals, the findings, and the properties of each toss.
 
     Raises:
-        DropspinError: It cannot be loaded, or no toss has a free flight.
+        DropspinError: The recording cannot be loaded, or no toss has a free flight.
     """
     flights = recording if isinstance(recording, Flights) else _flights(recording if isinstance(recording, Log) else load_log(recording))
     drag = regression([positions(flight, with_drag=True) for flight in flights.found])

@@ -182,13 +182,14 @@ def load_log(recording: str | Path) -> Log:
     """Load a recording.
 
     Args:
-        recording: The path of its header, a TOML file, or the name of one that comes with dropspin, such as `toss-cube`.
+        recording: The path of the recording's header, a TOML file, or the name of a recording that comes with dropspin, such as
+            `toss-cube`.
 
     Returns:
-        The recording in SI units, y up, quaternions [x, y, z, w] from body to world.
+        The recording in SI units, with y up and quaternions [x, y, z, w] from body to world.
 
     Raises:
-        DropspinError: A file is absent, damaged or too large, a key or a column is wrong, or the values cannot be a recording's.
+        DropspinError: A file is absent, damaged or too large, a key or a column is wrong, or the values are impossible for a recording.
     """
     given = str(recording)
     path = SHIPPED / f"{given}.toml" if given in log_names() else Path(recording)

@@ -112,7 +112,7 @@ def contacts(scene: Scenario, motion: Trajectory) -> "pd.DataFrame":
 
     Args:
         scene: A scene with a floor that does not end, without walls and without damping.
-        motion: Its motion, such as `simulate` returns it.
+        motion: A motion of the scene, for example from `simulate`.
 
     Returns:
         One row for each contact, which is a sequence of time steps in which the floor acts (`contact_runs`): `start` and `end` [s], the

@@ -196,7 +196,7 @@ def _writer(content: Mapping[str, Any]) -> str:
 
 
 def write_baseline(baseline: Baseline, path: str | Path) -> None:
-    """Write a baseline, completely or not at all.
+    """Write a baseline. If this fails, an existing file stays unchanged.
 
     Args:
         baseline: The baseline, from `accept`.

@@ -68,24 +68,24 @@ class Checked:
 def accept(
     results: Results, earlier: Baseline, reason: str, date: datetime.date, *, known_failures: bool = False
 ) -> tuple[Baseline, pd.DataFrame]:
-    """Accept the results of a run into a baseline.
+    """Add the results of a run to a baseline as accepted results.
 
-    Accepted results stay if the run does not cover them, if they changed by no more than their tolerance, or if the engine broke down in
-    the scene or is missing. All results of a scene that has changed are replaced.
+    An accepted result is kept if the run does not cover it, if the new result differs from it by at most its tolerance, or if the engine
+    broke down in the scene or is not installed. If the definition of a scene has changed, all its results are replaced.
 
     Args:
         results: The run.
         earlier: The earlier baseline; `Baseline()` if there is none.
         reason: The reason why these results are accepted, which is stored with them.
         date: Date of the acceptance.
-        known_failures: Whether to accept failing checks as known failures.
+        known_failures: Whether to accept failed checks as known failures.
 
     Returns:
         The new baseline, and a table of the differences from the earlier one. The table has a row for each result, with `value` and
         `before` in `unit`, and the `change`: new, worse, moved, better, same or gone.
 
     Raises:
-        DropspinError: The run is quick.
+        DropspinError: The run was made with `quick`.
     """
     verify_comparable(results)
     measured, covered = comparable_results(results), asked_for(earlier.results, results)
@@ -118,23 +118,22 @@ def accept(
 
 
 def check(results: Results, baseline: Baseline | None = None) -> Checked:
-    """Compare a run with accepted results. The verdicts on the expectations of its scenes stay unchanged.
+    """Compare a run with accepted results. The verdicts of its other checks stay the same.
 
-    A result fails if it is gone, or worse than the accepted result by more than the tolerance; a better result passes. A failed check that
-    was accepted as a known failure is `known` as long as its result is not worse.
+    A result fails if it is absent, or worse than the accepted result by more than the tolerance; a better result passes. A failed check
+    that was accepted as a known failure has the verdict `known`, unless its result is worse than the accepted one.
 
     Args:
         results: The run.
-        baseline: The accepted results, from `load_baseline`; with None, only the expectations of the scenes are checked.
+        baseline: The accepted results, from `load_baseline`; with None, only the other checks of the run count.
 
     Returns:
         `results`, the run with a row of kind `baseline` for each accepted result, whose `exit_code()` is that of the check;
         `changes`, its results compared with the accepted ones; and `not_run`, the accepted results that the run does not cover.
 
     Raises:
-        DropspinError: The run is quick, and there is a baseline.
-        NothingAccepted: The run covers no accepted result, so that the check would be empty. Not raised if engines broke down, which is
-            reported instead.
+        DropspinError: The run was made with `quick`, and there is a baseline.
+        NothingAccepted: The run covers no accepted result, so there is nothing to check. If engines broke down, this is reported instead.
     """
     if baseline is None:
         nothing = comparable_results(results).iloc[:0]

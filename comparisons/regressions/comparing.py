@@ -62,7 +62,8 @@ class Changes:
 def compare(old: Results, new: Results) -> Changes:
     """Compare a run with an earlier one.
 
-    Results of scenes, engines and time steps that were requested in only one of the runs are left out; they are neither new nor gone.
+    Results of scenes, engines and time steps that were requested in only one of the two runs are left out; they do not count as new or
+    gone.
 
     Args:
         old: The earlier run.
@@ -74,7 +75,7 @@ def compare(old: Results, new: Results) -> Changes:
         `motions`, how many motions are equal bit for bit.
 
     Raises:
-        DropspinError: The runs have no scene, engine and time step in common, or one is quick.
+        DropspinError: The runs have no scene, engine and time step in common, or one of them was made with `quick`.
     """
     verify_comparable(old, new)
     other = [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
@@ -147,7 +148,7 @@ class History:
 
 
 def history(runs: Mapping[str, Results]) -> History:
-    """Follow results over runs.
+    """Compare the results of several runs over time.
 
     Args:
         runs: Two or more runs, by name; they are sorted by start time.
@@ -157,7 +158,7 @@ def history(runs: Mapping[str, Results]) -> History:
         runs in which results changed, and the cause to which each change is attributed.
 
     Raises:
-        DropspinError: There are fewer than two runs, or one is quick.
+        DropspinError: There are fewer than two runs, or one of them was made with `quick`.
     """
     if len(runs) < 2:
         raise DropspinError(f"a history needs two or more runs, got {len(runs)}; give more, or a folder of runs.")

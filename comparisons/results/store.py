@@ -62,13 +62,13 @@ def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
 
     Args:
         folder: The folder that `dropspin run -o` or `write_report` wrote.
-        arrays: Whether to load trajectories and ensembles too; the tables alone load much faster.
+        arrays: Whether to load also the trajectories and ensembles; the tables alone load much faster.
 
     Returns:
         The run, equal to the one that was written.
 
     Raises:
-        DropspinError: The folder holds no run, a damaged one, or one of another format.
+        DropspinError: The folder does not contain a run, or the run is damaged or has another format.
     """
     try:
         content = parsed(read_stored(Path(folder), FILE))

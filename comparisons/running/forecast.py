@@ -24,9 +24,9 @@ class Forecast(NamedTuple):
     Attributes:
         seconds: Wall time [s].
         jobs: Number of scenes that run at a time.
-        by_engine: The part of each engine in it [s].
+        by_engine: The part of each engine in this wall time [s].
         by_scene: Wall time of each scene alone [s].
-        quick: Wall time of a quick run of the same [s].
+        quick: Wall time of the same run with `quick` [s].
     """
 
     seconds: float

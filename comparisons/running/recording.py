@@ -64,14 +64,14 @@ def simulate(scene: SceneLike, engine: Engine | str, dt: float, every: int = 1) 
         scene: A scene, its catalogue name, the path of its file, or a mapping with the same keys.
         engine: An engine, or its name with options, such as `mujoco[integrator=rk4]`.
         dt: Time step [s].
-        every: Steps between two rows.
+        every: Number of time steps between two rows.
 
     Returns:
-        The motion, one row for each `every` steps; the first is the start.
+        The motion: a row for the initial state and one after each `every` time steps.
 
     Raises:
         DropspinError: The engine is unknown, not installed, or declines the scene, or the time step does not fit it.
-        Diverged: The simulation broke down.
+        Diverged: The simulation diverged.
     """
     scene = as_scene(scene)
     chosen = engine if isinstance(engine, Engine) else engine_named(engine)
@@ -93,13 +93,13 @@ def record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_
         engine: The engine.
         scene: The scene; its duration gives the number of steps.
         dt: Time step [s].
-        every: Steps between two rows.
+        every: Number of time steps between two rows.
         extra_steps: Steps to take after the scene's end, each recorded, if its last state is finite.
         verify: Whether to compare what was built with the scene; a conformance check that studies something else does not.
 
     Raises:
         BuildMismatch: The engine built another scene, or its record is not one.
-        Diverged: The simulation broke down.
+        Diverged: The simulation diverged.
     """
     steps = scene.steps(dt)
     with engine.prepare(scene, dt) as simulation:
@@ -137,7 +137,7 @@ def record_batch(
 
     Raises:
         BuildMismatch: A motion does not begin at its start, or a record is not one.
-        Diverged: The simulation broke down.
+        Diverged: The simulation diverged.
     """
     batch = engine.prepare_batch(members, dt)
     if batch is None:

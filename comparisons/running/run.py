@@ -42,32 +42,33 @@ def run(
     quick: bool = False,
     on_forecast: Callable[[Forecast], None] | None = None,
 ) -> Results:
-    """Run every scene with every engine at every time step, measure, and judge.
+    """Run every scene with every engine at every time step, compute the metrics, and judge them.
 
     Args:
         scenes: One scene or several, with different names: each a scene, a catalogue name, the path of a file, or a mapping with the same
             keys.
-        engines: One engine or several: engines, or names with options. One that is not installed is `missing` in the
-            results, and one that cannot be imported or constructed `broken`.
+        engines: One engine or several: engines, or names with options. In the results, an engine that is not installed is `missing`, and
+            one that cannot be imported or constructed is `broken`.
         dt: One time step or several [s]; three or more that span a factor of four give orders and asymptotic errors.
-        on_progress: Called with scene, engine, time step and the simulations done: before and while an engine works, twice a second, and
-            with `finished` after each of the len(scenes) * len(engines) * len(dt) pieces of work; in any thread, but in one at a time.
-        resources: The processor time [s] and memory [bytes] that an engine may use for one of these pieces; each engine runs in a process
-            of its own.
+        on_progress: Called with the scene, the engine, the time step and the number of completed simulations: before an engine begins,
+            twice a second while it runs, and with `finished` after each combination of scene, engine and time step. Calls may come from any
+            thread, but never at the same time.
+        resources: The processor time [s] and memory [bytes] that an engine may use for one scene at one time step; each engine runs in a
+            separate process.
         keep: Called with the results of each scene as soon as it is done.
         done: Results of scenes from an earlier run. Those with the same request, versions and machine are not run again.
-        jobs: Number of scenes to run at a time; by default, the number of processors that this process may use. It changes no result: steps
-            are timed before, while nothing else runs.
-        quick: Whether to run few starts: 8 instead of 32 start phases, 16 members of an ensemble, and no perturbed starts in double
-            precision. A check that the sampling noise may decide is `measured`, intervals are wider, and the results have no tolerances,
-            so that `check` with a baseline, `accept`, `compare` and `compare history` refuse them.
-        on_forecast: Called once, when the steps are timed, with the time that the simulations will take.
+        jobs: Number of scenes to run at a time; by default, the number of processors that this process may use. It changes no result,
+            because time steps are timed first, while nothing else runs.
+        quick: Whether to run from fewer initial states: 8 instead of 32 start phases, 16 members of an ensemble, and no perturbed initial
+            states in double precision. A check on which sampling noise may decide has the verdict `measured`, and intervals are wider. The
+            results have no tolerances, so `check` with a baseline, `accept`, `compare` and `history` refuse them.
+        on_forecast: Called once, after the time steps were timed, with the time that the simulations will take.
 
     Returns:
-        The measurements with their verdicts, predictions, agreements of engines, and the motions.
+        The measurements with their verdicts, the predicted errors, the differences between engines, and the motions.
 
     Raises:
-        DropspinError: The request cannot be run: an unknown engine, an impossible time step, equal names.
+        DropspinError: An engine is unknown, a time step is impossible, or two scenes have the same name.
     """
     requested, entries, dts, stamp = _request(scenes, engines, dt, resources, quick)
     earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if not what_changed(part.provenance, stamp)}
@@ -170,10 +171,10 @@ def measure(scene: SceneLike, motion: Trajectory) -> dict[str, float]:
 
     Args:
         scene: A scene, its catalogue name, the path of its file, or a mapping with the same keys.
-        motion: The motion, from the scene's start, at equal time steps.
+        motion: The motion, from the initial state of the scene, with equal time steps.
 
     Returns:
-        By name, in the unit that `METRICS` has for it; NaN where the time step is too coarse.
+        The value of each metric by name, in the unit that `METRICS` states; NaN if the time step is too large.
 
     Raises:
         DropspinError: There is no such scene, or the motion is not a `Trajectory`, or not one of this scene: it has another start or

@@ -164,13 +164,13 @@ def count(where: str) -> int:
 
 
 def read_sweep(where: str) -> pd.DataFrame:
-    """The table of a sweep, in the order of its jobs; of an unfinished sweep, the jobs that have been run.
+    """The table of a sweep, in the order of its jobs; if the sweep is unfinished, with the jobs that have been run.
 
     Args:
         where: The folder, or a URL that fsspec supports.
 
     Returns:
-        One row a job.
+        One row for each job.
 
     Raises:
         DropspinError: The folder does not hold a sweep, none of its jobs has been run, or a part is damaged.
@@ -186,7 +186,7 @@ def read_sweep_parts(where: str, columns: list[str] | None = None) -> Iterator[p
 
     Args:
         where: The folder, or a URL that fsspec supports.
-        columns: Names of the columns to read; None: all.
+        columns: Names of the columns to read; None for all.
 
     Returns:
         An iterator over the parts, in the order of the jobs, each a PyArrow table.

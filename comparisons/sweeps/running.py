@@ -32,19 +32,19 @@ def run_sweep(
     resources: ResourceLimits = ONE_MINUTE,
     on_progress: Callable[[int], None] | None = None,
 ) -> None:
-    """Run the jobs of a sweep that a folder does not have yet.
+    """Run the jobs of a sweep whose results are not yet in a folder.
 
     Args:
         sweep: The sweep, from `load_sweep`.
         where: The folder, or a URL that fsspec supports.
-        resume: Whether the folder may hold parts of the same sweep, which are kept.
-        scheduler: The address of a Dask scheduler; None: run on this machine.
+        resume: Whether the folder may already have parts of the same sweep, which are then kept.
+        scheduler: The address of a Dask scheduler; None to run on this machine.
         resources: The processor time [s] and memory [bytes] that an engine may use for one job.
-        on_progress: Called with the number of jobs completed since the last call, first with those that the folder has; may raise to
-            stop the sweep.
+        on_progress: Called with the number of jobs completed since the last call; the first call counts those already in the folder. It may
+            raise an exception to stop the sweep.
 
     Raises:
-        DropspinError: The folder holds something else, or is not writable.
+        DropspinError: The folder contains other files or another sweep, or is not writable.
     """
     work = Work.of(sweep, resources)
     folder = SweepFolder(where, work.identity, work.part_size)

@@ -91,7 +91,7 @@ def load_sweep(spec: str | Path | Mapping[str, Any]) -> Sweep:
         The sweep, for `run_sweep`; its `size` is the number of jobs.
 
     Raises:
-        DropspinError: The spec is not valid, or a scene, engine, field or value in it is not. The text says which.
+        DropspinError: The spec, or a scene, an engine, a field or a value in it, is not valid. The message says which.
     """
     if isinstance(spec, Mapping):
         where, content, folder = "spec", spec, Path()

@@ -44,7 +44,7 @@ def symmetries(
     resources: ResourceLimits = ONE_MINUTE,
     jobs: int | None = None,
 ) -> list[Finding]:
-    """Run scenes and scenes that have the same motion, and compare the motions.
+    """Run scenes and transformed scenes that should have the same motion, such as rotated ones, and compare the motions.
 
     Args:
         scenes: One scene or several: scenes, catalogue names, paths of files, or mappings; by default seven of different kinds.
@@ -57,7 +57,7 @@ def symmetries(
             changes no result.
 
     Returns:
-        One finding for each scene, engine and symmetry that the scene has.
+        One result for each scene, engine and symmetry of the scene.
 
     Raises:
         DropspinError: A scene or an engine does not exist, a time step does not fit a scene, or two scenes have the same name.

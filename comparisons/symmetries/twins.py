@@ -82,7 +82,7 @@ def twins(
         jobs: Number of scenes to run at a time; by default, the number of processors that this process may use. It changes no result.
 
     Returns:
-        One finding for each scene and pair of engines.
+        One result for each scene and pair of engines.
 
     Raises:
         DropspinError: A scene or an engine does not exist, there are fewer than two engines, or a time step does not fit a scene.

@@ -1,7 +1,7 @@
 """Plots: each function returns a `Chart`, and each `plot_` function draws one into axes, for notebooks and papers.
 
-A plot function creates no figure and no legend; it labels its lines, so that `axes.legend()` creates a legend.
-`figure_of` makes a whole figure of charts, for a column or a page. docs/examples.md shows every plot with the code that draws it.
+A `plot_` function creates neither a figure nor a legend. It labels its lines, so `axes.legend()` creates a legend.
+`figure_of` makes a figure of charts that is as wide as a column or a page. docs/examples.md shows every plot with the code that draws it.
 """
 
 from dropspin.reports.plots.bounces import bounce_ladder as bounce_ladder

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 
 def bounce_ladder(results: Results, scene_name: str) -> Chart:
-    """The apex after each bounce relative to the drop height, logarithmic, for each engine at the finest time step, and the exact e²ᵏ.
+    """The height of the apex after bounce k relative to the drop height, logarithmic, at the smallest time step, and the exact value e²ᵏ.
 
-    A flight is the motion between two contacts. The plot ends at the first flight shorter than 16 steps.
+    e is the coefficient of restitution. The plot ends before the first flight (the motion between two contacts) of fewer than 16 steps.
 
     Args:
         results: The run.
-        scene_name: One of its scenes; its exact solution must have impacts, all of them with the floor.
+        scene_name: The name of a scene of the run. Its exact solution must have impacts, all of them with the floor.
 
     Raises:
         DropspinError: The exact solution of the scene has no impact, or there is no exact solution.

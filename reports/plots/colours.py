@@ -61,9 +61,9 @@ def engine_colours(engines: Sequence[str]) -> dict[str, str]:
 
 
 def human_label(label: str) -> str:
-    """An engine and its options as a reader writes them: `MuJoCo, RK4` for `mujoco[integrator=rk4]`; any other text unchanged.
+    """The name of an engine with its options as plots show it: `MuJoCo, RK4` for `mujoco[integrator=rk4]`; any other text unchanged.
 
-    What follows the label after a comma stays, as in `mujoco, in milliseconds`.
+    Text that follows the engine after a comma stays, as in `mujoco, in milliseconds`.
     """
     if not (parts := LABEL.fullmatch(label)):
         return label

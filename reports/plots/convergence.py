@@ -27,15 +27,15 @@ BAND = 1.3
 def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
     """The absolute value of an error as a function of the time step, logarithmic.
 
-    Dotted lines have the orders of the errors that vanish, rounded to integers; where rounding errors leave too few time steps to determine
-    an order, that between the two coarsest. Dashed lines are the fits from which the order and the
-    asymptotic error are taken, crosses are predicted errors. Bands at the left end are the 95 % intervals of asymptotic errors that exclude
-    0.
+    A dotted line has the slope of the observed order, rounded to an integer, if the error vanishes as dt → 0. If rounding errors leave too
+    few time steps to fit an order, the slope is that between the two largest time steps. Dashed lines are the fits that give the order and
+    the asymptotic error; crosses are predicted errors. If the 95 % interval of an asymptotic error excludes 0, a band at the left end shows
+    it.
 
     Args:
         results: The run.
-        scene_name: One of its scenes.
-        metric: One of its metrics.
+        scene_name: The name of a scene of the run.
+        metric: The name of a metric of this scene.
     """
     shown, predictions = (
         rows[(rows["scene"] == scene_name) & (rows["metric"] == metric)].to_dict("records") for rows in (results.table, results.predictions)

@@ -22,7 +22,7 @@ def angular_momentum_of_ensemble(results: Results, scene_name: str) -> Chart:
     """The magnitude of the angular momentum L over time: median and 10th–90th percentile of each engine.
 
     It is divided by r √(2 E M), with the energy E of the scene and the size r and the mass M of the body. This is the angular momentum of a
-    ring of radius r whose rotational energy is E, a scale that is above 0 even if the body does not rotate initially.
+    ring of radius r and mass M whose rotational energy is E. It is positive even if the body does not rotate initially.
     """
     found = at_one_step(results, results.ensembles, scene_name, min)
     return Chart(TIME, "|L| / (r √(2 E M))", [_spread(outcome.t, outcome.angular_momentum, style) for outcome, style in found])

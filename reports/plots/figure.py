@@ -30,7 +30,7 @@ FARTHEST = 1.5
 
 
 def figure_of(charts: Sequence[Chart], size: str = "report", look: str = "light") -> "Figure":
-    """A figure of charts with one legend; a single chart has labels at the ends of its lines in place of a legend, where they fit.
+    """A figure of charts with one legend; a single chart has labels at the ends of its lines instead, if they fit.
 
     Args:
         charts: The charts, each of which gets a panel.
@@ -72,8 +72,8 @@ def _add_legend(figure: "Figure", named: dict[str, Any]) -> None:
 def label_ends(axes: "Axes") -> bool:
     """Label the lines of axes at their right ends, in place of a legend.
 
-    Labels are moved up or down so that they do not overlap. If a line ends elsewhere, or if labels are too long or would be moved too far,
-    none is added.
+    Labels are moved up or down so that they do not overlap. No label is added if a line ends before the right edge, if a label is too long,
+    or if it would have to move too far.
 
     Returns:
         Whether the labels fit.
@@ -129,7 +129,7 @@ def _readable(colour: Any) -> Any:
 
 
 def save_figure(figure: "Figure", file: str | Path) -> None:
-    """Save a figure as SVG with text as text, as PDF with TrueType fonts, or as PNG; equal figures give equal files."""
+    """Save a figure as SVG in which text stays text, as PDF with TrueType fonts, or as PNG. Equal figures give equal files."""
     from matplotlib import rc_context
 
     file = Path(file)
@@ -150,7 +150,7 @@ def save_charts(charts: Sequence[Chart], file: Path) -> None:
 def save_data(charts: Sequence[Chart], file: str | Path) -> None:
     """Save the data of charts as CSV, with all digits: a row for each point of each line.
 
-    Columns are the number of the chart, the labels of its axes, the label of the line, x, y, and the ends `low` and `high` of an interval.
+    The columns are the number of the chart, the labels of its axes, the label of the line, x, y, and the ends `low` and `high` of a band.
     """
     lines = [
         {"chart": number, "x_label": chart.x_label, "y_label": chart.y_label, "line": line.label}

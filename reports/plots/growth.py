@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 
 def error_growth(results: Results, scene_name: str, metric: str) -> Chart:
-    """The absolute value of an error over time, logarithmic, for each engine at the finest time step.
+    """The absolute value of an error over time, logarithmic, for each engine at the smallest time step.
 
-    The maximum of a line is the value of the metric for a single initial state. As for the metrics, velocities are compared in the middle
-    half of each flight, because an impact that occurs one time step late is an error in time and would appear as a spike in energy. Lines
-    have gaps around impacts, and end where the motion is desynchronised from the exact solution.
+    The maximum of a line is the value of the metric for a single initial state. As for the metrics, velocities are compared only in the
+    middle half of each flight. Otherwise an impact that occurs one time step late, which is an error in time, would appear as a spike in
+    energy. Lines therefore have gaps around impacts. They end where the bounces no longer correspond to those of the exact solution.
 
     Args:
         results: The run.
@@ -32,7 +32,7 @@ def error_growth(results: Results, scene_name: str, metric: str) -> Chart:
 
     Raises:
         DropspinError: The scene has no exact solution.
-        UnknownName: The metric is not defined at each time.
+        UnknownName: `metric` is not a key of `ERRORS`.
     """
     scene = results.scenes[scene_name]
     truth = truth_for(scene)

@@ -18,12 +18,12 @@ LONGEST_LABEL = 22
 
 
 def result_over_runs(history: History, scene_name: str, metric: str) -> Chart:
-    """The absolute value of a metric at the finest time step over the runs, logarithmic; a cross marks each run in which it changed.
+    """The absolute value of a metric at the smallest time step in several runs, logarithmic; a cross marks each run in which it changed.
 
     Args:
         history: The runs.
-        scene_name: One of their scenes.
-        metric: One of its metrics.
+        scene_name: The name of a scene of the runs.
+        metric: The name of a metric of this scene.
     """
 
     def of(results: "pd.DataFrame") -> "pd.DataFrame":

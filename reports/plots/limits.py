@@ -34,7 +34,7 @@ def failure_modes(found: RobustnessStudy, axis_name: str) -> Chart:
 
     Args:
         found: The study.
-        axis_name: One of its axes.
+        axis_name: The name of an axis of the study.
     """
     scans = [scan for scan in found.scans if scan.axis.name == axis_name]
     axis = scans[0].axis

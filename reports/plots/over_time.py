@@ -32,12 +32,12 @@ def height(scene: Scenario, motion: Trajectory) -> Array:
 
 
 def tilt(scene: Scenario, motion: Trajectory) -> Array:
-    """Upward component of the y axis of the body: 1 upright, -1 upside down."""
+    """Vertical component of the body's y axis: 1 if the body is upright, -1 if it is upside down."""
     return rotate(motion.orientation, np.array([0.0, 1.0, 0.0]))[:, 1]
 
 
 def angular_momentum_length(scene: Scenario, motion: Trajectory) -> Array:
-    """|L| [kg m²/s]."""
+    """Magnitude of the angular momentum [kg m²/s]."""
     return np.linalg.norm(angular_momentum(scene, motion), axis=1)
 
 
@@ -60,14 +60,14 @@ def quantities(scene: Scenario) -> dict[str, Quantity]:
 
 @np.errstate(all="ignore")  # an engine may return 1e300
 def over_time(results: Results, scene_name: str, quantity: Quantity) -> Chart:
-    """A quantity over time: each engine at the coarsest time step, where engines differ most, and the exact solution or the recording.
+    """A quantity over time for each engine at the largest time step, where engines differ most, and for the exact solution or recording.
 
-    A curve that oscillates too fast to be drawn is shown as an envelope: the smallest and the largest value around each point.
+    A curve that oscillates too fast to be drawn is shown as an envelope of its smallest and largest values.
 
     Args:
         results: The run.
-        scene_name: One of its scenes.
-        quantity: A function of a scene and a motion, shape (n,).
+        scene_name: The name of a scene of the run.
+        quantity: A function of a scene and a motion that returns the values to plot, shape (n,).
     """
     scene = results.scenes[scene_name]
     truth = reference_for(scene)

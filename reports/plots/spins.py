@@ -36,12 +36,12 @@ SUBSCRIPTS = "₁₂₃"
 def polhode(results: Results, scene_name: str) -> Chart:
     """The path of the angular velocity in the body frame, on the energy ellipsoid of the initial state.
 
-    Engines are drawn at the coarsest time step, with the exact solution. A marker shows the end of each path. Without a gyroscopic term the
-    path is a point; with an explicit one it leaves the ellipsoid.
+    The plot shows each engine at the largest time step, and the exact solution. A marker shows the end of each path. Without a gyroscopic
+    term the path is a point; with an explicit gyroscopic term it leaves the ellipsoid.
 
     Args:
         results: The run.
-        scene_name: One of its scenes, with an initial angular velocity.
+        scene_name: The name of a scene of the run, with an initial angular velocity.
 
     Raises:
         DropspinError: The initial angular velocity of the scene is 0.

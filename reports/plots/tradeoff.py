@@ -20,13 +20,13 @@ FRONT, SPREAD = 5.0, 1.0
 
 
 def error_over_cost(found: "TradeOff", worlds: int | None = None) -> Chart:
-    """Error over cost, both logarithmic: a line for the time steps of each engine, and the Pareto front.
+    """Error over cost, both logarithmic: a line for each engine, which connects its time steps, and the Pareto front.
 
     Horizontal bars reach from the smallest to the largest timing of all rounds; for batches, from the smallest to the median.
 
     Args:
         found: The trade-off.
-        worlds: The number of worlds of a batch, for the cost per world; only engines that can simulate such batches are then shown.
+        worlds: The number of worlds of a batch, to plot the cost per world; only engines that can simulate batches are then shown.
     """
 
     def costs(point: "CostPoint") -> tuple[float, float, float]:

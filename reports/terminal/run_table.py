@@ -12,12 +12,12 @@ if TYPE_CHECKING:
 
 
 def print_table(results: Results, console: "Console | None" = None, *, summary_only: bool = False) -> None:
-    """Print every metric of every engine at the finest time step, the spread between independent engines, and the summary.
+    """Print every metric of every engine at the smallest time step, the largest difference between independent engines, and the summary.
 
     Args:
         results: The run.
-        console: Rich's console to print to; None means standard output.
-        summary_only: Whether to print the summary alone.
+        console: The Rich console to print to; None for standard output.
+        summary_only: Whether to print only the summary.
     """
     summary, tables = overview(results), [] if summary_only else scene_parts(results)
     print_document(document(results, summary, tables, unexpected_failures(results, summary)), console)

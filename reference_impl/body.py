@@ -15,14 +15,15 @@ Array = NDArray[np.float64]
 class Body:
     """A rigid body: its mass, its inertia and the vertices that may touch the floor.
 
-    In an ensemble of B bodies each attribute may have one more axis, first, of length B.
+    In an ensemble of B bodies, each attribute may have an additional first axis of length B.
 
     Attributes:
         mass: M [kg], or shape (B,).
         inertia: I_body about the centre of mass, in the body frame [kg m²], shape (3, 3) or (B, 3, 3).
         points: Vertices relative to the centre of mass, in the body frame [m], shape (n, 3) or (B, n, 3).
-        semi_axes: Of the ellipsoid about each vertex, along the axes of the body frame [m], shape (3,) or (B, 3); 0 in the lecture note. A
-            ball of radius R is one vertex at its centre with (R, R, R), a cylinder two vertices on its axis, y, with (R, 0, R).
+        semi_axes: The semi-axes of the ellipsoid about each vertex, along the axes of the body frame [m], shape (3,) or (B, 3); 0 in the
+            lecture note. A ball of radius R has one vertex at its centre and the semi-axes (R, R, R); a cylinder has two vertices on its
+            axis y and the semi-axes (R, 0, R).
     """
 
     mass: float | Array
@@ -59,14 +60,14 @@ class Wall(NamedTuple):
 
 @dataclass(frozen=True)
 class World:
-    """The world that acts on a body. A part that is None is not modelled and costs nothing.
+    """The gravity, floor, damping and walls that act on a body. A part that is None is not simulated and takes no time.
 
     Attributes:
         gravity: g [m/s²], shape (3,) or (B, 3).
         floor: The floor y = 0.
         damping: Decay rates of velocity and angular velocity [1/s], each a number or of shape (B,); the factors of Algorithm 1 are
             c = exp(-rate dt).
-        walls: Other planes, which act after the floor, in this order.
+        walls: Further planes, which act after the floor and in this order.
     """
 
     gravity: Array | None = None

@@ -12,9 +12,9 @@ def total_mass(masses: NDArray[np.float64]) -> float:
 
 
 def vertex_inertia(points: NDArray[np.float64], masses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Eq 8 with its masses: I_body = Σ mᵢ (pᵢᵀpᵢ 1 − pᵢpᵢᵀ).
+    """Inertia tensor of point masses at the vertices, eq 8 with masses: I_body = Σ mᵢ (pᵢᵀpᵢ 1 − pᵢpᵢᵀ).
 
-    The lecture note prints the formula without mᵢ; masses of 1 give the printed formula, for any mass of the body.
+    The lecture note prints the formula without mᵢ; masses of 1 give the printed formula.
 
     Args:
         points: Vertices relative to the centre of mass, in the body frame [m], shape (n, 3).
@@ -28,11 +28,11 @@ def vertex_inertia(points: NDArray[np.float64], masses: NDArray[np.float64]) -> 
 
 
 def solid_box_inertia(mass: float, half_extents: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inertia of a uniform box, m/3 (b² + c²) about the axis of a [kg m²], shape (3, 3)."""
+    """Inertia tensor of a uniform box with half extents a, b, c: m/3 (b² + c²) about the axis of a [kg m²], shape (3, 3)."""
     a, b, c = half_extents**2
     return np.diag(mass / 3.0 * np.array([b + c, c + a, a + b]))
 
 
 def solid_sphere_inertia(mass: float, radius: float) -> NDArray[np.float64]:
-    """Inertia of a uniform ball, 2/5 m R² [kg m²], shape (3, 3)."""
+    """Inertia tensor of a uniform ball of radius R: 2/5 m R² [kg m²], shape (3, 3)."""
     return 0.4 * mass * radius**2 * np.eye(3)

@@ -40,7 +40,7 @@ COLLIDE: Mapping[str, Mapping[str, KernelFunction]] = {
 
 @dataclass(frozen=True)
 class Methods:
-    """One method for each place of the algorithm; the defaults are those of the lecture note.
+    """The method for each part of the algorithm: rotation, impact law, and contact treatment. The defaults are those of the lecture note.
 
     Raises:
         ValueError: A method does not exist, or the contact treatment does not work with the law.

@@ -29,13 +29,13 @@ def step(
     forces: ArrayLike | None = None,
     methods: Methods | None = None,
 ) -> Array:
-    """Advance one state, or an ensemble of them, by one step of Algorithm 1 of the lecture note.
+    """Advance one state, or an ensemble of states, by one step of Algorithm 1 of the lecture note.
 
     Args:
         states: Position [m], orientation [x, y, z, w] (of any length; it is normalised), velocity [m/s], angular velocity [rad/s],
             shape (13,) or (B, 13).
         body: The body, or an ensemble of B.
-        world: What acts on it.
+        world: The gravity, floor, damping and walls that act on it.
         dt: Time step [s], a number or shape (B,).
         forces: Force on each vertex, in the world frame [N], shape (n, 3) or (B, n, 3) (eq 9). None: no forces.
         methods: The methods. None: those of the lecture note.
@@ -64,7 +64,7 @@ def simulate(
     methods: Methods | None = None,
     threads: int | None = None,
 ) -> Array:
-    """Advance one state, or an ensemble of them, by many steps, recording each `every`-th.
+    """Advance one state, or an ensemble of states, by many steps, and record the state after each `every` steps.
 
     If an argument (states, masses, time steps, …) is given for each of B bodies, the simulation is an ensemble of B; an argument that is
     given once applies to all bodies. A body moves in an ensemble exactly as it does alone, to the last bit, for any number of threads.
@@ -72,7 +72,7 @@ def simulate(
     Args:
         states: As in `step`, shape (13,) or (B, 13).
         body: The body, or an ensemble of B.
-        world: What acts on it.
+        world: The gravity, floor, damping and walls that act on it.
         dt: Time step [s], a number or shape (B,).
         steps: Number of steps.
         every: Number of steps between two rows of the result. Remaining steps at the end are not taken.
@@ -81,7 +81,7 @@ def simulate(
             Ctrl-C takes effect between blocks of bodies; one body runs to its end.
 
     Returns:
-        The states, the start first, shape (1 + steps // every, 13) or (B, 1 + steps // every, 13).
+        The states, beginning with the initial one, shape (1 + steps // every, 13) or (B, 1 + steps // every, 13).
 
     Raises:
         ValueError: As in `step`.

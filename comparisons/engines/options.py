@@ -108,7 +108,7 @@ def calibrated_values(settings: Mapping[str, Setting]) -> dict[str, Value]:
 
 @dataclass(frozen=True)
 class Configured:
-    """What has a name and options.
+    """The name and the options of an engine.
 
     Attributes:
         options: The options that differ from the defaults.
@@ -118,15 +118,15 @@ class Configured:
 
     name: ClassVar[str]
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    """Each option's values, the default first."""
+    """The allowed values of each option, with the default first."""
     numbers: ClassVar[Mapping[str, NumericOption]] = {}
-    """Each numeric option's default and range."""
+    """The default and the range of each numeric option."""
     settings: ClassVar[Mapping[str, Setting]] = {}
     """The settings of the engine's library that can be given as options, by their documented names."""
     accuracy: ClassVar[Mapping[str, tuple[float | str, ...]]] = {}
-    """Options besides the time step that set the accuracy, each with three values or more, coarsest first: {"rtol": (1e-4, 1e-6, 1e-8)}.
+    """Options that set the accuracy besides the time step, with three or more values, least accurate first: {"rtol": (1e-4, 1e-6, 1e-8)}.
 
-    Where an error does not vanish as dt → 0, `run` refines these options together with the time step.
+    If an error does not vanish as dt → 0, `run` refines these options together with the time step.
     """
     representations: ClassVar[tuple[str, ...]] = ()
     """Names of `choices` on which the motion does not depend: they represent the same scene in different ways, such as a box as a mesh, or
@@ -202,35 +202,35 @@ class Configured:
         return spelled(self.numbers[option].default) if option in self.numbers else self.choices[option][0]
 
     def option(self, name: str) -> str:
-        """An option's value, given or default."""
+        """The value of an option, which is the default if the option was not given."""
         return self.options.get(name, self._default(name))
 
     @property
     def given(self) -> dict[str, Any]:
-        """The values of the settings that were given."""
+        """The values of the settings that were given explicitly."""
         return {name: self.settings[name].parsed(text) for name, text in self.options.items() if name in self.settings}
 
     def unmet_need(self, setting: str) -> tuple[str, str] | None:
-        """An option with the value without which a setting has no effect; None if it has one."""
+        """An option and the value that it must have for a setting to have an effect; None if the setting has an effect."""
         return next((need for need in self.settings[setting].needs if self.option(need[0]) != need[1]), None)
 
     @property
     def is_default(self) -> bool:
-        """Whether the engine keeps its own defaults (profile=default)."""
+        """Whether the engine has its own default settings (`profile=default`)."""
         return self.options.get("profile") == "default"
 
     @property
     def is_calibrated(self) -> bool:
-        """Whether all settings are those of the calibrated profile."""
+        """Whether all settings have their calibrated values."""
         return not self.is_default and not self.given
 
     @property
     def calibrated(self) -> Self:
-        """The engine with calibrated settings and its other options."""
+        """The same engine with calibrated settings; its other options stay."""
         return self.without(["profile", *self.settings])
 
     def without(self, names: Collection[str]) -> Self:
-        """The engine without some of its options, and without the settings that have no effect then."""
+        """The same engine without some of its options, and without settings that then have no effect."""
         left = {name: text for name, text in self.options.items() if name not in names}
         needs = {name: self.settings[name].needs for name in left if name in self.settings}
         acting = {name for name in needs if all(left.get(option, self._default(option)) == value for option, value in needs[name])}
@@ -238,7 +238,7 @@ class Configured:
 
     @property
     def label(self) -> str:
-        """The canonical name: `name[option=value,…]`, options sorted, defaults left out."""
+        """The name with sorted options, `name[option=value,…]`; options with their default value are left out."""
         listed = ",".join(f"{key}={value}" for key, value in self.options.items())
         return f"{self.name}[{listed}]" if listed else self.name
 
@@ -246,19 +246,19 @@ class Configured:
         return replace(self, options={**self.options, **options})
 
     def accuracy_levels(self) -> list[Self]:
-        """The engine with each set of values of its accuracy options, coarsest first; empty if it has none."""
+        """The engine with each set of values of its accuracy options, least accurate first; empty if it has no such options."""
         count = min(map(len, self.accuracy.values()), default=0)
         finest = {option: values[-count:] for option, values in self.accuracy.items()}
         return [self._with({option: spelled(values[level]) for option, values in finest.items()}) for level in range(count)]
 
     def refined(self, dts: Sequence[float]) -> list[tuple[float, Self]]:
-        """The finest of some time steps [s], coarsest first, and the engine at each, its accuracy options refined with the step."""
+        """The smallest of the given time steps [s], largest first, each with the engine whose accuracy options are refined accordingly."""
         levels = self.accuracy_levels()
         count = min(len(dts), len(levels))
         return list(zip(sorted(dts)[:count][::-1], levels[-count:], strict=True))
 
     def represented_otherwise(self) -> dict[str, Self]:
-        """The engine with each other value of each option in `representations`, by text such as `with body=mesh`."""
+        """By a text such as `with body=mesh`, the engine with each other value of each option in `representations`."""
         return {
             f"{REPRESENTED}{option}={value}": self._with({option: value})
             for option in self.representations

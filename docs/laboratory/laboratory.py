@@ -30,7 +30,7 @@ inertia = "vertices"
 
 [start]
 position = [0.0, 0.59, 0.0]  # 0.6 m, over a floor at 0.01 m
-orientation = [0.0, 0.3, 0.0, 1.0]  # turned about the vertical, so that the wall strikes it askew
+orientation = [0.0, 0.3, 0.0, 1.0]  # turned about the vertical, so that the impact on the wall is oblique
 velocity = [5.0, 2.0, 0.0]
 
 [gravity]
@@ -54,7 +54,7 @@ friction = "infinite"
 DT, GRAVITY = 0.015, 9.8
 RADIUS = 0.15  # m, without the bumps
 BUMPS = (((0.4, 0.9, 0.0), 0.5, 0.02), ((-0.4, 0.9, 0.0), 0.5, 0.02), ((0.0, -0.3, 1.0), 0.25, 0.12), ((0.0, -0.3, -1.0), 0.25, 0.12))
-"""Two ears and two cheeks: directions, heights relative to the radius, and widths; the axes of the body are principal axes."""
+"""Two ears and two cheeks: their directions, heights relative to the radius, and widths. The body axes are principal axes."""
 CELLS = (1, 2, 4, 8, 16, 22, 32, 50, 70)
 
 
@@ -112,7 +112,7 @@ def rotation(states: Array) -> Array:
 
 
 def energies(scene: ds.Scenario, states: Array) -> tuple[Array, Array]:
-    """Kinetic energy, and that in the field of gravity above the floor, per kilogram [J/kg], shape (n,) each."""
+    """Kinetic energy and potential energy above the floor, per kilogram [J/kg], shape (n,) each."""
     moments = np.array(scene.body.inertia_tensor) / scene.body.mass
     spins = np.einsum("ijn,ni->nj", rotation(states), states[:, 10:])  # in the body frame
     kinetic = 0.5 * np.sum(states[:, 7:10] ** 2, axis=1) + 0.5 * np.einsum("ni,ij,nj->n", spins, moments, spins)
@@ -142,7 +142,7 @@ def by_vertices(dt: float) -> Iterator[list[Any]]:
 
 
 def by_steps() -> Iterator[list[Any]]:
-    """For each time step: the body after 1 and 3 s, with the factors as they stand, and with their rates."""
+    """For each time step: the position after 1 and 3 s, with the damping factors in each step, and with the decay rates."""
     scene = scene_of(22)
     assert scene.damping is not None
     rates = scene.model_copy(update={"damping": scene.damping.model_copy(update={"factor_dt": None})})
@@ -155,7 +155,7 @@ def by_steps() -> Iterator[list[Any]]:
 
 
 def budget(engine: str, cells: int = 22) -> list[Any]:
-    """Where the energy goes in 3 s [J/kg]: at the start; lost in flight by damping and scheme, at the floor and the wall; at the end."""
+    """Energies over 3 s [J/kg]: at the start; changes in flight, at the floor and at the wall; the largest gain in a step; at the end."""
     scene = scene_of(cells)
     states = ds.simulate(scene, engine, DT).states
     kinetic, height = energies(scene, states)
@@ -167,7 +167,7 @@ def budget(engine: str, cells: int = 22) -> list[Any]:
 
 
 def across_engines() -> Iterator[list[Any]]:
-    """The laboratory in each engine: after the first impact, at the wall, and after 1 s."""
+    """For each engine: the velocities after the first impact, which is at the wall, and the position after 1 s."""
     scene = scene_of(22)
     for engine in ("wang", "wang[contact=sequential,law=coulomb]", "mujoco", "pybullet"):
         for dt in (DT, DT / 16):

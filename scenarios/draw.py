@@ -1,7 +1,8 @@
 """Random scenes, each with an exact solution. An engine can be tuned to a fixed list of scenes, but not to random ones.
 
 The scenes are taken from fifteen families in turn. U(a, b) is a uniform, LU(a, b) a log-uniform distribution; directions and orientations
-are uniform (from normal variates: G. Marsaglia, Annals of Mathematical Statistics 43 (1972)). Spin is the initial angular velocity.
+are uniformly distributed (from normal variates: G. Marsaglia, Annals of Mathematical Statistics 43 (1972)). The spin of a body is its
+initial angular velocity.
 
     all           mass LU(0.01, 1000) kg; diameters and edge lengths LU(0.1, 1) m; points are normally distributed, with half of such a
                   length as standard deviation

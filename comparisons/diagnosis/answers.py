@@ -27,11 +27,11 @@ class Remedy(NamedTuple):
     """A change that removes a finding.
 
     Attributes:
-        text: What to write, and where.
-        value: The value measured with it; NaN if it was not tried.
-        unit: Its unit.
-        others: The number of other bodies of the model that it applies to as well.
-        runs: Whether the whole model runs with it.
+        text: The text to write into the file, and where.
+        value: The value measured with the remedy; NaN if it was not tried.
+        unit: The unit of the value.
+        others: The number of other bodies of the model to which the remedy also applies.
+        runs: Whether the whole model can be simulated with the remedy.
     """
 
     text: str
@@ -43,14 +43,14 @@ class Remedy(NamedTuple):
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that is wrong with a value.
+    """An error or an effect of settings that exceeds a threshold.
 
     Attributes:
         kind: The kind of finding.
-        settings: The names of the settings that cause it.
-        remedies: What removes it.
-        detail: A sentence's part that explains it.
-        shares: The shares of the settings that explain it, if several act; settings that do so only together as one, such as `a, b`.
+        settings: The names of the settings that cause the finding.
+        remedies: The changes that remove the finding.
+        detail: Part of a sentence that explains the finding.
+        shares: If several settings act, the share of each in the effect; settings that act only together have one share, as `a, b`.
     """
 
     kind: Kind
@@ -61,28 +61,28 @@ class Finding:
 
     @property
     def is_error(self) -> bool:
-        """Whether it is a difference from the exact solution with the settings in force."""
+        """Whether the finding is a difference from the exact solution with the settings of the file."""
         return self.kind in ("time step", "model")
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A measured value of a body, beside the exact ones.
+    """A measured value of a body, with the exact values.
 
     Attributes:
-        question: What it is about, such as `fall`.
-        quantity: What was measured.
-        unit: Its unit.
-        direction: The direction of the start: a body axis of a spin, or the angle of a slide to an axis of the surface.
-        speed: The speed of the start [m/s]; NaN for none.
-        measured: The value at the file's time step; NaN if it is computed alone.
-        in_force: The exact value with the settings in force; NaN if it is not known.
+        question: The kind of motion, such as `fall`.
+        quantity: The measured quantity.
+        unit: The unit of the values.
+        direction: The initial direction: a body axis of a spin, or the angle of a slide to an axis of the surface.
+        speed: The initial speed [m/s]; NaN if there is none.
+        measured: The value at the file's time step; NaN if the quantity is only computed.
+        in_force: The exact value with the settings of the file; NaN if it is not known.
         physical: The exact value without damping, armature and margin; NaN if it is not known.
-        limit: The value as dt → 0, extrapolated; NaN if it is not determined.
-        least: The least value over start phases; NaN if there is one start.
-        most: The largest.
-        findings: What is wrong with it.
-        detail: What replaces a value that is not a number.
+        limit: The value extrapolated to dt → 0; NaN if it is not determined.
+        least: The smallest value over the start phases; NaN if there is only one initial state.
+        most: The largest value over the start phases; NaN if there is only one initial state.
+        findings: The findings on this value.
+        detail: The text that is shown if the value is not a number.
     """
 
     question: str

@@ -47,7 +47,7 @@ OF_SIZE, OF_RATIO, OF_DRAG = 0.1, 0.1, 0.5
 
 @dataclass(frozen=True)
 class Value:
-    """A value with its 95 % interval; it is not identifiable if the half width of that is larger than `useful`."""
+    """A value with its 95 % interval. The flights do not determine the value if the half width of the interval is larger than `useful`."""
 
     name: str
     value: float
@@ -58,13 +58,13 @@ class Value:
 
     @property
     def half_width(self) -> float:
-        """Of the interval."""
+        """The half width of the interval."""
         return 0.5 * (self.high - self.low)
 
 
 @dataclass(frozen=True)
 class TossFacts:
-    """A toss: `frames` of its flight from `first` on, 0 without one, and its `noise` over that of the others."""
+    """The flight of a toss: its first frame, its number of frames (0 without a flight), and its noise relative to that of the others."""
 
     name: str
     first: int
@@ -83,7 +83,7 @@ class Check:
 
     @property
     def corrected(self) -> Header:
-        """The header with the keys of each finding that has one cause."""
+        """The header, corrected by the keys of each finding that has a single cause."""
         content = self.flights.log.header.model_dump()
         for finding in self.findings:
             if len(finding.causes) == 1:
@@ -93,7 +93,7 @@ class Check:
 
     @property
     def reads_the_columns_right(self) -> bool:
-        """Whether units, axes and quaternions are what the header says, but for an error of the scale."""
+        """Whether the header states units, axes and quaternions correctly; an error of the scale is ignored."""
         return not any(finding.kind in ("up", "unit", "quaternion") for finding in self.findings)
 
 

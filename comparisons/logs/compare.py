@@ -77,13 +77,13 @@ class Pair:
 
     @property
     def differs(self) -> bool:
-        """Whether the tosses tell the two apart."""
+        """Whether the interval of the difference excludes 0."""
         return self.lower > 0.0 or self.upper < 0.0
 
 
 @dataclass(frozen=True)
 class Share:
-    """A part of an engine's mean error over the motion, with its 95 % interval."""
+    """A part of the mean error of an engine, with its 95 % interval."""
 
     engine: str
     quantity: str

@@ -36,8 +36,8 @@ class Estimate:
         value: The estimate.
         lower: Lower end of the interval.
         upper: Upper end of the interval.
-        has_lower: Whether the tosses bound it from below; if not, `lower` is that of the values tried.
-        has_upper: Whether the tosses bound it from above.
+        has_lower: Whether the tosses bound the parameter from below; if not, `lower` is the smallest tested value.
+        has_upper: Whether the tosses bound the parameter from above; if not, `upper` is the largest tested value.
     """
 
     engine: str
@@ -55,11 +55,11 @@ class Transfer:
 
     Attributes:
         parameter: `friction` or `restitution`.
-        first: An engine's label.
-        second: Another one's.
-        difference: The difference of the estimates.
-        lower: Lower end of its interval.
-        upper: Upper end of its interval.
+        first: Label of the first engine.
+        second: Label of the second engine.
+        difference: The estimate of the first engine minus that of the second.
+        lower: Lower end of the interval of the difference.
+        upper: Upper end of the interval of the difference.
         verdict: `equal` if the interval is within `EQUAL` of 0, `different` if it is on one side of 0, else `undecided`.
     """
 

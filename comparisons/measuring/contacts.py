@@ -46,12 +46,13 @@ class ContactResiduals:
 
     Attributes:
         motion: The number of the motion of each of these time steps, shape (n,).
-        steps: Their numbers, the first step being 0, shape (n,).
-        in_contact: Whether they are in a contact, shape (n,); only `pull` is not 0 in others.
-        pull: Impulse with which the floor pulls, over M v, shape (n,), with the speed v at which the kinetic energy is the scene's energy.
-        cone_excess: Impulse along the floor beyond the friction coefficient times the normal impulse, over M v, shape (n,); NaN if
-            friction is infinite.
-        push: Impulse of friction times the slip in its direction, summed over the contacts, over the scene's energy, shape (n,).
+        steps: The numbers of these time steps, beginning with 0, shape (n,).
+        in_contact: Whether each of these time steps belongs to a contact, shape (n,); in all others, only `pull` can differ from 0.
+        pull: Impulse with which the floor pulls, divided by M v, shape (n,). M is the mass; v is the speed at which the kinetic energy
+            equals the scene's energy.
+        cone_excess: Impulse along the floor in excess of the coefficient of friction times the normal impulse, divided by M v, shape (n,);
+            NaN if friction is infinite.
+        push: Impulse of friction times the slip in its direction, summed over the contacts, divided by the scene's energy, shape (n,).
         gap: Height of the body's lowest point above the floor, before or after the step, whichever is lower [m], shape (n,).
     """
 

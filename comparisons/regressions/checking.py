@@ -44,7 +44,7 @@ STALE = "the scene has changed since its results were accepted; accept them agai
 
 
 class NothingAccepted(DropspinError):
-    """A baseline has no result that the run covers."""
+    """Raised if a run covers no accepted result of a baseline."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Checked:
         changes: The results of the run compared with the accepted ones: the table that `changes.changes` returns, largest change first;
             empty without a baseline.
         not_run: Accepted results that the run does not cover, because it has other scenes, engines or time steps.
-        attributions: For each engine with failing accepted results, the causes to which they are attributed, and how many to each.
+        attributions: For each engine whose accepted results fail, the causes to which the failures are attributed, with their numbers.
     """
 
     results: Results

@@ -33,9 +33,9 @@ class Changes:
 
     Attributes:
         results: The table of comparable results that `changes.changes` returns, largest change first.
-        attributions: The cause to which the changes of an engine are attributed, by engine.
+        attributions: For each engine, the cause to which its changes are attributed.
         surroundings: The differences that affect all engines, as text.
-        other_scenes: Scenes that are different in the later run, so that their results are not compared.
+        other_scenes: Scenes whose definition differs between the runs, so their results are not compared.
         in_one_only: Scenes, engines and time steps that were requested in only one of the runs, as text.
         speed: The change of each engine's speed relative to the others.
         motions: How many motions of each engine are equal bit for bit; empty if the runs were loaded without trajectories.
@@ -55,7 +55,7 @@ class Changes:
 
     @property
     def regressions(self) -> pd.DataFrame:
-        """The results that fail a comparison: worse, moved, or gone."""
+        """The results that make the comparison fail: those that are worse, moved or gone."""
         return regressed(self.results)
 
 
@@ -117,8 +117,8 @@ class Move:
 
     Attributes:
         engine: Label of the engine.
-        before: Number of the last earlier run that has this engine.
-        run: Number of the run.
+        before: Number of the last earlier run that contains this engine.
+        run: Number of the run in which the results changed.
         results: The changes (worse, better or moved) that `changes.changes` returns, largest first.
         attribution: The cause to which the changes are attributed.
     """
@@ -132,12 +132,12 @@ class Move:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Runs in the order of their time.
+    """The results of several runs in the order of their start times.
 
     Attributes:
         names: Names of the runs.
-        stamps: Time, commit and versions of each.
-        results: The comparable results of all runs; `run` is the number.
+        stamps: Time, commit and versions of each run.
+        results: The comparable results of all runs; the column `run` is the number of the run.
         moves: The changes, in the order of the runs.
     """
 

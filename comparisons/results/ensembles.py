@@ -13,14 +13,15 @@ QUICK_MEMBERS = 16
 
 @dataclass(frozen=True, eq=False)
 class EnsembleOutcome:
-    """What became of each member of an ensemble.
+    """The results of each member of an ensemble.
 
     Attributes:
         t: Times [s], shape (SAMPLES,).
-        energy: Energy of each at these times, over the scene's energy, shape (size, SAMPLES).
-        rebound: Largest height of each after its first contact, over its start's height, shape (size,); 0 without a contact.
-        rest_time: When each was last in motion [s], shape (size,).
-        angular_momentum: |L| of each at these times, over r √(2 E M), E the scene's energy and r the body's size, shape (size, SAMPLES).
+        energy: Energy of each member at these times, divided by the scene's energy, shape (size, SAMPLES).
+        rebound: Largest height of each member after its first contact, divided by its initial height, shape (size,); 0 without a contact.
+        rest_time: The last time at which each member moved [s], shape (size,).
+        angular_momentum: Magnitude of the angular momentum of each member at these times, divided by r √(2 E M), with the scene's energy E
+            and the body's size r and mass M, shape (size, SAMPLES).
     """
 
     t: Array

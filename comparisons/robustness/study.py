@@ -52,7 +52,7 @@ FINAL = frozenset({"sound", "declined", "crashed", "timed_out"})
 
 @dataclass(frozen=True)
 class ScanPoint:
-    """The diagnosis of an engine at one value of an axis."""
+    """The failure mode of an engine at one value of an axis."""
 
     value: Annotated[float, Field(allow_inf_nan=False)]
     diagnosis: Diagnosis
@@ -65,7 +65,7 @@ class ScanPoint:
 
 @dataclass(frozen=True)
 class AxisScan:
-    """The scan of an engine along an axis: its diagnoses in the order of their values; `base` is the nominal value."""
+    """The scan of an engine along an axis: its failure modes in the order of the values; `base` is the nominal value."""
 
     axis: Annotated[
         Axis, PlainValidator(lambda axis: AXES[axis] if isinstance(axis, str) else axis), PlainSerializer(lambda axis: axis.name)

@@ -49,10 +49,10 @@ class Ladder:
 
     Attributes:
         engine: Label of the engine.
-        steps: Each time step tried [s], from the coarsest, and the absolute value of the metric at it; NaN if it is undefined.
+        steps: Each tested time step [s], beginning with the largest, and the absolute value of the metric; NaN if the metric is undefined.
         ended: The kind of reason why no smaller time step was tried.
         reason: The reason why no smaller time step was tried, as a clause.
-        left_out: The reason why the engine is left out of the comparison; empty if it is not.
+        left_out: The reason why the engine is left out of the comparison; empty if it is compared.
     """
 
     engine: str

@@ -42,9 +42,9 @@ class CostPoint:
         dt: Time step [s].
         error: Absolute value of the metric.
         cost: Wall time per simulated second in each round [s/s], shape (rounds,).
-        costs_per_world: By number of worlds in a batch, the smallest wall time per simulated second and world [s/s]; empty for an engine
-            that cannot simulate batches.
-        spreads_per_world: By number of worlds, the `spread` of these timings.
+        costs_per_world: For each number of worlds in a batch, the smallest wall time per simulated second and world [s/s]; empty if the
+            engine cannot simulate batches.
+        spreads_per_world: For each number of worlds, the median of these timings divided by the smallest.
     """
 
     engine: str
@@ -61,14 +61,14 @@ class CostPoint:
 
 
 class Recommendation(NamedTuple):
-    """The cheapest configuration within a tolerance, and the next best one of another engine or method.
+    """The cheapest configuration within a tolerance, and the cheapest one of another engine or method.
 
     Attributes:
         within: The tolerance.
         best: The cheapest configuration.
-        next_best: The next best configuration; None if no other engine reaches the tolerance at a tested time step.
-        ratio: The ratio of the cost of the next best configuration to that of the best; the median over the rounds.
-        level: Whether the difference between the two is too small to rely on.
+        next_best: The cheapest configuration of another engine or method; None if none reaches the tolerance at a tested time step.
+        ratio: The cost of `next_best` divided by that of `best`, the median over the rounds.
+        level: Whether the two costs count as equal.
     """
 
     within: float
@@ -88,7 +88,8 @@ class TradeOff:
         points: The configurations with a measured error and cost.
         ladders: The time steps tried for every requested engine, and the reason why no smaller one was tried.
         worlds: The numbers of worlds in a batch.
-        memory_per_world: By engine, the memory that the largest batch takes per world [bytes]; empty below 1,024 worlds.
+        memory_per_world: For each engine, the memory per world in the largest batch [bytes]; empty if this batch has fewer than 1,024
+            worlds.
         load: Average number of threads per processor that ran or waited for a processor, besides the timed one; NaN if not known.
     """
 

@@ -17,12 +17,12 @@ EXACT, RECORDED = "exact solution", "recording"
 
 @dataclass(frozen=True, eq=False)
 class Impact:
-    """One collision with the floor or a wall.
+    """An impact on the floor or a wall.
 
     Attributes:
-        time: Time of the collision [s].
-        before: State just before, shape (13,).
-        after: State just after, shape (13,).
+        time: Time of the impact [s].
+        before: State just before the impact, shape (13,).
+        after: State just after the impact, shape (13,).
         wall: The number of the wall; None for the floor.
     """
 

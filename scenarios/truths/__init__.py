@@ -1,6 +1,6 @@
 """Exact solutions ("truths"). Each file solves one problem and states its formula, its source and its range of validity.
 
-`measured` is no exact solution: `reference_for` gives it for a scene with a recording, `truth_for` never does.
+`measured` is not an exact solution. `reference_for` returns it for a scene with a recording; `truth_for` does not.
 """
 
 from collections.abc import Callable
@@ -39,14 +39,14 @@ ON_FLOOR: tuple[Solution, ...] = (
     coulomb_turn,
     point_contact,
 )
-"""The solutions of scenes with a floor and without damping; each is None for a scene that is not of its kind, and the first that is not
-counts.
+"""The functions that solve scenes with a floor and without damping. Each returns None for a scene that it does not cover; the first
+solution is used.
 """
 SAME_IMPULSE = 1e-6
-"""Largest difference of two impulses, over the momentum, that is due to rounding: 1e-13 in the integration, which impacts amplify."""
+"""Largest difference of two impulses, relative to the momentum, that counts as rounding: 1e-13 in the integration, amplified by impacts."""
 
 
-@lru_cache(maxsize=128)  # a run, its tables and its plots all need it, and the solution of a tumble takes a second
+@lru_cache(maxsize=128)  # a run, its tables and its plots all need it, and solving a tumbling motion takes a second
 def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
     """Return the exact motion of a scene, or None if no exact solution is known.
 
@@ -93,7 +93,7 @@ def reference_for(scene: Scenario) -> Truth | None:
 
 
 def _among_planes(scene: Scenario, floor: Floor, law: Law | None) -> Truth | None:
-    """The solution that holds longest with walls, or on a floor that ends: that of impacts, or one of the floor alone while it is true."""
+    """The solution that is valid longest with walls or a floor that ends: that of impacts, or one for an endless floor while valid."""
     if scene.clearance < -TOUCHING * scene.body.size:
         return None  # it starts beside or below the floor
     struck = corner_impact(scene, floor, law)
@@ -105,12 +105,12 @@ def _among_planes(scene: Scenario, floor: Floor, law: Law | None) -> Truth | Non
 
 
 def other_laws(scene: Scenario) -> dict[Law, Truth]:
-    """The exact solutions under the other laws of impacts with friction, as far as an impact differs from that under the scene's law.
+    """The exact solutions under the other laws of impacts with friction, if an impact differs from that under the scene's law.
 
-    Where the slip turns during an impact these are different models, and none is the error of another.
+    If the slip turns during an impact, the laws are different models, and their difference is not an error.
 
     Returns:
-        By law; empty without an impact with a coefficient of friction, with walls, and where the laws agree.
+        The solutions, by law. Empty if no impact has a coefficient of friction, if the scene has walls, or if the laws agree.
     """
     truth = truth_for(scene)
     if truth is None or not truth.events or scene.wall is not None or law_of(scene) not in FRICTION_LAWS:
@@ -120,7 +120,7 @@ def other_laws(scene: Scenario) -> dict[Law, Truth]:
 
 
 def _has_other_impulses(truth: Truth, other: Truth) -> bool:
-    """Whether an impact that two solutions have in common has another impulse."""
+    """Whether two solutions have different impulses in an impact that both have."""
     return any(
         np.linalg.norm(first.after[VELOCITY] - second.after[VELOCITY]) > SAME_IMPULSE * np.linalg.norm(first.before[VELOCITY])
         for first, second in zip(truth.events, other.events, strict=False)

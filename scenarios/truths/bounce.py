@@ -9,8 +9,8 @@ For e < 1 the impacts accumulate at t₀ + (2 u₀ / g) e / (1 - e), Zeno's time
 Source: Newton's law of restitution (Principia, 1687, scholium to the laws); geometric sums.
 Valid for: a ball on a frictionless floor, with any spin and any horizontal motion; a body that lands on a face, or a round body that lands
 where it can lie, such as a capsule on its side, on a frictionless floor, with any horizontal motion and with spin only about the vertical,
-up to rounding; all on any floor without spin and horizontal motion; gravity straight down, no damping. Valid until a difference of one eps
-in a spin about the intermediate axis can turn the body over.
+up to rounding; each of these on any floor, if it has no spin and no horizontal motion; gravity straight down, no damping. Valid until a
+difference of one eps in a spin about the intermediate axis can turn the body over.
 """
 
 import math
@@ -29,7 +29,7 @@ MIN_FLIGHT_SHARE = 1e-12
 """Flights shorter than this share of the first fall count as rest; the apexes of such flights are below 1e-24 of the drop height."""
 
 DIRECTIONS, SMALL_TURN = 16, 1e-3
-"""The turns by which it is tested whether a round body lies: about so many horizontal axes, by so much [rad]."""
+"""The small rotations by which the code tests whether a round body lies: the number of horizontal axes, and the angle [rad]."""
 
 SPIN_ROUNDING = 1e-15
 """Largest horizontal part of an angular velocity about the vertical that counts as rounding, relative to the angular velocity."""
@@ -42,7 +42,7 @@ def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
     g = -float(scene.acceleration[1])
     start = scene.initial_state
     upward = float(start[8])
-    # A body within TOUCHING of the floor starts on it; otherwise a ball at rest would bounce a nanometre high for ever.
+    # A body within TOUCHING of the floor starts on it; otherwise a ball at rest would keep bouncing by a nanometre.
     clearance = scene.clearance if scene.clearance > TOUCHING * scene.body.size else 0.0
     u0 = math.sqrt(upward**2 + 2.0 * g * clearance)
     t0 = (upward + u0) / g
@@ -116,7 +116,7 @@ def _stays_flat(scene: Scenario, floor: Floor) -> bool:
 
 
 def _lies(scene: Scenario) -> bool:
-    """Whether a small turn about no horizontal axis lowers a round body on the floor, so that it does not fall over from there."""
+    """Whether a round body lies on the floor without falling over: no small rotation about a horizontal axis brings it lower."""
     body, pose, angles = scene.body, np.array(scene.start.orientation), np.linspace(0.0, 2.0 * math.pi, DIRECTIONS, endpoint=False)
     axes = np.stack([np.cos(angles), np.zeros(DIRECTIONS), np.sin(angles)], axis=1)
     heights = [-float(body.lowest(turn, 0.0)[0, 1]) for turn in multiply(about(axes, np.full(DIRECTIONS, SMALL_TURN)), pose)]

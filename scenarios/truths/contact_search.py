@@ -8,8 +8,8 @@ that a body can have, because |(I_j - I_k)/I_i| <= 1. So from its height h and i
 and there is no contact before the first zero of the right-hand side. The zeros approach a contact quadratically from before. Without
 rotation c = 0, and the first zero is the contact.
 
-About a corner there may be an ellipsoid, with semi-axes S. Its lowest point is another one at each time; with n the upward direction in the
-body, n' = dn/dt, and c for the farthest of its points, all of them together are at
+A corner may be the centre of an ellipsoid with the semi-axes S, whose lowest point changes with time. With n the upward direction in the
+body, n' = dn/dt, and c for the farthest of its points, the height of all its points is
 
     h(t + s) >= y + v_y s + (n + n' s) · r - |S (n + n' s)| + (g_y - c) s²/2
              >= h + v s + (g_y - c - |S n'|²/|S n|) s²/2, and

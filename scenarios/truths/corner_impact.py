@@ -88,7 +88,7 @@ def corner_impact(scene: Scenario, floor: Floor, law: Law | None = None) -> Trut
 
 @dataclass(frozen=True, eq=False)
 class _Plane:
-    """The floor, which is number 0, or a wall, and its impact law."""
+    """A plane that the body may strike, the floor (number 0) or a wall, with its impact law."""
 
     surface: Surface
     law: Law
@@ -121,7 +121,7 @@ class _Plane:
 
 @dataclass(frozen=True, eq=False)
 class _Flight:
-    """One flight, which ends at the time `end` [s] with an impact, or with the scene, or with the solution for the `reason`."""
+    """One flight. At the time `end` [s] there is an impact, or the scene ends, or the solution ends for the `reason`."""
 
     motion: Flight
     end: float

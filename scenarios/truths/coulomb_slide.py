@@ -2,7 +2,7 @@
 
     dv/dt = g_t - f g_n v/|v|        g_t, g_n: gravity along the floor and into it
 
-It stays where it stops if |g_t| <= f g_n, as does one that starts at rest. On a level floor it stops at t = |v₀|/(f g), after
+If |g_t| <= f g_n, it stays where it stops, and a body that starts at rest does not move. On a level floor it stops at t = |v₀|/(f g), after
 |v₀|²/(2 f g). The body stays flat if the normal force can act ahead of the centre of mass by f times its height; at rest, down the slope by
 |g_t|/g_n times its height. These points must lie within the base.
 
@@ -51,10 +51,10 @@ def coulomb_slide(scene: Scenario, floor: Floor) -> Truth | None:
 
 
 def _stays_flat(scene: Scenario, velocity: Array, slope: Array, friction: float) -> bool:
-    """Whether the normal force can act where it must within the base.
+    """Whether the point at which the normal force must act is within the base.
 
-    Its distance from the centre of mass is height times friction coefficient, in the direction of the velocity, which turns from that of
-    the start towards the slope; at rest it is height times slope.
+    The distance of this point from the centre of mass is height times friction coefficient, in the direction of the velocity, which turns
+    from its initial direction towards the slope. If the body is at rest, the distance is height times slope.
     """
     base = scene.body.lowest(np.array(scene.start.orientation), TOUCHING)
     hull = convex_hull(base[:, [0, 2]]) if scene.starts_on_floor and len(base) >= 3 else None

@@ -1,4 +1,4 @@
-"""A velocity in a plane under a constant pull and friction of constant size against it, common to sliding and rolling.
+"""A velocity in a plane under a constant acceleration and under friction of constant size that opposes it, for sliding and rolling.
 
     du/dt = p - a u/|u|        until u = 0; then u = 0 if a >= |p|, else u' = p - a p/|p|
 
@@ -24,7 +24,7 @@ Motion = Callable[[Array], tuple[Array, Array]]
 """A function from times [s], shape (n,), to velocities and their integrals, each of shape (n, 3)."""
 
 NEWTON_STEPS = 200
-"""Each step halves the interval at least every other time, so that far fewer suffice."""
+"""At least every other step halves the interval, so far fewer steps suffice."""
 ALONG_A_LINE = 1e-15
 """Sine of the angle between velocity and pull up to which they are parallel."""
 

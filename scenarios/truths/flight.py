@@ -9,7 +9,7 @@ With decay rates k of velocity and κ of angular velocity (v' = g - k v, (I ω)'
     x(t) = x₀ + v₀ t φ₁(kt) + g t² φ₂(kt),   v(t) = v₀ e⁻ᵏᵗ + g t φ₁(kt)
     ω(t) = e^(-κt) Ω(s),  orientation of the free rotor Ω at the time s = t φ₁(κt)
 
-because with the time s, the damped Euler equations become the free ones.
+because with s as the time, the damped Euler equations become those without damping.
 
 Source: Galileo (1638), Discorsi, fourth day, for the parabola; J. Bernoulli (1719) for a resistance proportional to speed; `free_rotor`
 for the orientation.

@@ -58,7 +58,7 @@ class FreeRotor:
 
     @cached_property
     def horizon(self) -> float:
-        """Time up to which one eps of the start leaves the motion determined [s]: `rotor_horizon`."""
+        """Time up to which a change of one eps in the initial state does not change the motion noticeably [s]: `rotor_horizon`."""
         return self.find_horizon()
 
     def __call__(self, t: Array) -> tuple[Array, Array]:

@@ -2,7 +2,7 @@
 
 With the velocity u of the point, u' = u + K j, and N the normal, two models of the impact extend Coulomb's law of a contact force:
 
-    cone         u'_n = -e u_n;  j = j_n (N - f d) against the slip u'_t = s d that is left, s > 0, or u'_t = 0 and |j_t| <= f j_n
+    cone         u'_n = -e u_n;  j = j_n (N - f d) against the remaining slip u'_t = s d, s > 0, or u'_t = 0 and |j_t| <= f j_n
     integrated   du/dp = K (N - f d) over the normal impulse p, d = u_t/|u_t|: the law holds at each instant of the impact. Where the slip
                  stops, the point sticks if that needs no more than f, else it slips on in the one direction that lasts. The impact ends by
 
@@ -11,8 +11,8 @@ With the velocity u of the point, u' = u + K j, and N the normal, two models of 
         energy   where the work of the normal impulse after u_n = 0 is e² times that before
 
 All agree if the point slips in one direction until the impact ends, or if normal and tangential motion are uncoupled, as in a ball of equal
-moments; `newton` also agrees with the cone if the slip stops without turning and sticks. Else they are different models, and neither is the
-error of the other. With Newton's restitution, energy may be gained at a rough corner (T. R. Kane, 1984); with `energy` it is not.
+moments; `newton` also agrees with the cone if the slip stops without turning and sticks. Otherwise they are different models, and their
+difference is not an error. With Newton's restitution, energy may be gained at a rough corner (T. R. Kane, 1984); with `energy` it is not.
 
 Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988), for the cone; E. J. Routh, Elementary Rigid
 Dynamics (1905), sections 187-194, J. B. Keller, Impact with friction, J. Applied Mechanics 53 (1986), and W. J. Stronge, Impact Mechanics

@@ -50,8 +50,7 @@ def law_of(scene: Scenario, surface: Surface | None = None) -> Law:
 def velocities_after(state: Array, point: Array, mass: float, inertia: Array, surface: Surface, law: Law) -> Array | None:
     """Velocity and angular velocity, shape (6,), after the impact of one point, offset `point` from the centre in the world frame [m].
 
-    A state in the frame of a wall gives them in that frame.
-    None if the law has no solution, or several.
+    If the state is in the frame of a wall, so is the result. None if the law has no solution, or several.
     """
     q, v, w = state[ORIENTATION], state[VELOCITY], state[SPIN]
     axes = rotate(q, np.eye(3))  # rows: the body's axes in the world

@@ -1,7 +1,7 @@
-"""The motion of a measured toss: no exact solution, but what engines are compared with in scenes of a recording.
+"""The motion of a measured toss. It is not an exact solution, but the reference of engines in scenes with a recording.
 
-It is known in the frames of the recording, and there alone errors are measured. Between two frames, for replays and plots, it is drawn at
-constant velocities, those of the differences of the frames.
+The motion is known only in the frames of the recording, and errors are measured only there. For replays and plots, it is interpolated
+between two frames with constant velocity and angular velocity.
 
 Source: the recording; the estimated state at its start is that of `dropspin.comparisons.logs.flights`.
 Valid for: scenes with a recording, until its last frame.
@@ -42,6 +42,6 @@ def measured(recording: Recording, toss: Toss) -> Truth:
 
 
 def tosses(scene: Scenario) -> list[tuple[Scenario, Truth]]:
-    """The scene from the start of each toss of its recording, and the toss."""
+    """For each toss of a scene's recording, the scene with the initial state of the toss, and the toss."""
     assert scene.recording is not None
     return [(scene.starting_at(toss.starts[0]), measured(scene.recording, toss)) for toss in scene.recording.tosses]

@@ -14,7 +14,7 @@ FASTER = 2.0
 
 
 def until_near(scene: Scenario, truth: Truth, *, walls: bool = True) -> Truth | None:
-    """A solution up to the time at which the body may touch a wall, or may reach the end of the floor; None if it may at the start.
+    """A solution up to the time at which the body may touch a wall, or may reach the end of the floor; None if it may do so at the start.
 
     Between two samples the body moves by at most the largest speed times the interval: it is away from a plane if the sphere about it that
     contains it is further away than that.
@@ -22,7 +22,7 @@ def until_near(scene: Scenario, truth: Truth, *, walls: bool = True) -> Truth | 
     Args:
         scene: The scene.
         truth: The solution on a floor without an end and, if `walls`, without walls.
-        walls: Whether walls are to be kept away from; False for a solution that has them.
+        walls: Whether the solution ends near walls; False for a solution that includes impacts with walls.
     """
     end = min(scene.duration, truth.horizon)
     times = np.linspace(0.0, end, SAMPLES)
@@ -40,7 +40,7 @@ def until_near(scene: Scenario, truth: Truth, *, walls: bool = True) -> Truth | 
 
 
 def _room(scene: Scenario, states: Array, walls: bool) -> Array:
-    """Distance from the planes that are to be kept away from, of the sphere about the centre of mass that contains the body [m]."""
+    """Distance of the sphere about the centre of mass that contains the body from the planes that the body must not touch [m]."""
     assert scene.floor is not None
     position, room = states[:, POSITION], np.full(len(states), np.inf)
     for wall in (scene.wall or ()) if walls else ():

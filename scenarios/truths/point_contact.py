@@ -48,7 +48,7 @@ from dropspin.scenarios.truths.truth import Truth
 AT_REST = 1e-12
 """Speed of the contact point that counts as rest, relative to that of the body."""
 ACROSS = 1e-12
-"""Largest part of a direction across the one that is meant, relative to it, that is attributed to rounding."""
+"""Largest component of a direction perpendicular to the intended one, relative to its length, that is attributed to rounding."""
 TINY = 1e-300
 FLATTEST = 1e-3
 """Sine of the angle between the face within a rim and the floor at which the face counts as touching it."""
@@ -64,7 +64,7 @@ COARSER = 300.0
 
 
 def point_contact(scene: Scenario, floor: Floor) -> Truth | None:
-    """The exact solution of a body on one contact point; None if the scene is no such motion."""
+    """The exact solution of a body on one contact point; None for other scenes."""
     start = scene.initial_state
     if scene.acceleration[1] >= 0.0 or not scene.starts_on_floor:
         return None

@@ -4,8 +4,8 @@ With r the radius, I the moment of inertia, k = 1 + M r²/I, and s = v + ω × (
 
     ds/dt = g_t - k f g_n s/|s|                    sliding; g_t, g_n: gravity along the floor and into it
     s = 0 from then on, if |g_t| <= k f g_n        rolling
-    v = v₀ + g_t t - (s₀ + g_t t - s)/k            of both, because friction changes v and s as 1 : k
-    ω = ω₀ + (k - 1)/r Y × (s₀ + g_t t - s)/k      of both, by the torque of the same friction
+    v = v₀ + g_t t - (s₀ + g_t t - s)/k            in both cases, because friction changes v and s in the ratio 1 : k
+    ω = ω₀ + (k - 1)/r Y × (s₀ + g_t t - s)/k      in both cases, by the torque of the same friction
 
 A solid ball, k = 7/2, that is thrown without spin rolls at 5/7 of its speed; on a slope it rolls with 5/7 of g_t. A solid cylinder has
 k = 3, a hollow one k = 2. The component of ω along Y is constant. The angle of the rotation is an integral of ω where its direction is
@@ -35,9 +35,9 @@ from dropspin.scenarios.truths.truth import Truth, piece
 NO_SLIP = 1e-14
 """Speed of a contact point that counts as rest, relative to the ball's speed."""
 ONE_AXIS = 1e-14
-"""Largest part of an angular velocity across the largest one, relative to it, up to which the axis counts as constant."""
+"""Largest component of an angular velocity perpendicular to the largest one, relative to it, up to which the axis counts as constant."""
 ACROSS = 1e-12
-"""Largest part of a direction across the one that is meant, relative to it, that is attributed to rounding."""
+"""Largest component of a direction perpendicular to the intended one, relative to its length, that is attributed to rounding."""
 SAMPLES = 50
 """Times at which the axis is compared."""
 STEP = 0.05
@@ -92,9 +92,9 @@ def _ball(scene: Scenario) -> tuple[float, float] | None:
 
 
 def _on_its_side(scene: Scenario, along: Sequence[Array]) -> tuple[float, float] | None:
-    """The radius of a body of revolution that lies on its side, and its moment about its axis; None if it leaves its course.
+    """The radius of a body of revolution that lies on its side, and its moment of inertia; None if it does not roll straight.
 
-    It keeps it if the axis is a principal axis, the spin is about it, and what is along the floor is across it.
+    It rolls straight if its axis is a principal axis, the spin is about this axis, and velocity and slope are perpendicular to it.
     """
     body, orientation, spin = scene.body, np.array(scene.start.orientation), np.array(scene.start.angular_velocity)
     number = _axis_of_revolution(body)

@@ -12,7 +12,7 @@ from dropspin.reports.commands.options import BASELINE, as_json
     "--baseline",
     default=BASELINE,
     metavar="FILE",
-    help="The baseline; the file is created if it does not exist. dropspin check has the same default.",
+    help="The baseline file; it is created if it does not exist. dropspin check has the same default.",
 )
 @click.option(
     "--known-failures",
@@ -23,7 +23,8 @@ from dropspin.reports.commands.options import BASELINE, as_json
 def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_failures: bool, json_output: bool) -> None:
     """Accept a run's results as the new baseline.
 
-    Results that changed by no more than their tolerance stay as they are in the file. Results that RUN does not cover stay too.
+    RUN is the folder that dropspin run -o wrote. Accepted results stay as they are in the file if they changed by no more than their
+    tolerance, or if RUN does not cover them.
     """
     import datetime
     import os

@@ -26,9 +26,9 @@ def bugs_command(names: tuple[str, ...], is_to_prepare: bool, environments: str,
     """Show publicly reported bugs of engines, each in the releases that have it and in those that do not.
 
     CASE is a reported bug; the default is all. Its scene is run with each release in an environment of its own, and the result is compared
-    with the closed form of the fault.
+    with the value that the fault predicts in closed form.
 
-    Exit code: 1 if a release does not do what was reported, 3 if one could not be run.
+    Exit code: 1 if the releases do not show a fault as reported, 3 if a release could not be run.
     """
     from dropspin.comparisons.record.bugs import load_bugs, measure, prepare
     from dropspin.comparisons.running.parallel import as_jobs

@@ -14,13 +14,14 @@ from dropspin.reports.terminal.safe import echo
 @click.option("--restitution", type=click.FloatRange(0.0, 1.0), required=True, metavar="E", help="Coefficient of restitution.")
 @click.option("--dt", type=float, required=True, metavar="SECONDS", help="The time step.")
 @click.option("--friction", default="none", metavar="F", help="none, infinite or a coefficient.")
-@click.option("--shape", type=click.Choice(["ball", "box"]), default="ball", help="The shape that falls.")
+@click.option("--shape", type=click.Choice(["ball", "box"]), default="ball", help="The shape of the falling body.")
 @click.option("--as", "language", metavar="LANGUAGE", help="Print only the text to paste: python, mjcf or urdf.")
 @as_json
 def calibrate_command(friction: str, language: str | None, json_output: bool, **options: Any) -> None:
     """Print the settings that give a coefficient of restitution at a time step, ready to paste, with measured results.
 
-    MuJoCo's contact is a damper over one time step or, with -e mujoco[spring_steps=20], a spring over 20.
+    For MuJoCo, the settings make the contact a damper that acts for one time step or, with -e mujoco[spring_steps=20], a spring that acts
+    for 20 time steps.
     """
     from dropspin.comparisons.calibration import calibrate
     from dropspin.reports.stories import calibrate as view

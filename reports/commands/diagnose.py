@@ -11,9 +11,9 @@ from dropspin.reports.commands.options import POSITIVE, as_json, engines_option,
 @click.command("diagnose")
 @click.argument("file", metavar="FILE")
 @engines_option
-@click.option("--body", "bodies", multiple=True, metavar="NAME", help="A body to diagnose; repeat for more. [default: all that are free]")
-@click.option("--on", metavar="GEOM", help="The plane or box that it lands on. [default: the first that it collides with]")
-@click.option("--loose", is_flag=True, help="Also diagnose links on joints, each cut from its joint.")
+@click.option("--body", "bodies", multiple=True, metavar="NAME", help="A body to diagnose; repeat for more. [default: all free bodies]")
+@click.option("--on", metavar="GEOM", help="The plane or box to land on. [default: the first that the body collides with]")
+@click.option("--loose", is_flag=True, help="Also diagnose bodies on joints, each cut loose from its joint.")
 @click.option("--density", default=1000.0, type=POSITIVE, metavar="KG/M3", help="Density of a mesh.")
 @click.option("--restitution", type=click.FloatRange(0.0, 1.0), metavar="E", help="Target for the coefficient of restitution.")
 @click.option("--friction", type=POSITIVE, metavar="MU", help="Target for the coefficient of friction.")
@@ -22,10 +22,10 @@ from dropspin.reports.commands.options import POSITIVE, as_json, engines_option,
 @output_option("out/diagnosis", "for the tables and the report")
 @as_json
 def diagnose_command(file: str, output: str, json_output: bool, **options: Any) -> int:
-    """Measure what the settings of your model do: an MJCF or URDF file, or a mesh (.obj, .stl).
+    """Measure what the settings of your model do: FILE is an MJCF or URDF file, or a mesh (.obj, .stl).
 
-    Each free body is simulated alone, with the file's own settings, above the surface that it lands on: how it falls, spins, lands,
-    rests, slides and rolls, compared with exact solutions with these settings and without them. A remedy marked "tried" was simulated.
+    Each free body is simulated alone, with the file's own settings, above the surface that it lands on. Its fall, spin, impact, rest,
+    slide and roll are compared with exact solutions with these settings and without them. A remedy marked "tried" was simulated.
 
     Exit code: 0 no impossible inertia and no missed target, 1 otherwise, 2 bad input.
     """

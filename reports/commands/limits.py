@@ -23,7 +23,7 @@ from dropspin.reports.commands.options import POSITIVE, as_json, engines_option,
     default=0.1,
     type=POSITIVE,
     metavar="TOLERANCE",
-    help="The largest error that counts as sound: a ratio, or an angle in radians.",
+    help="The largest error with which an engine counts as sound: a ratio, or an angle in radians.",
 )
 @time_limit_option(60.0, "an engine may use for one tested value")
 @jobs_option("axes to scan")
@@ -32,8 +32,8 @@ from dropspin.reports.commands.options import POSITIVE, as_json, engines_option,
 def limits_command(scenes: tuple[str, ...], axes: tuple[str, ...], output: str, json_output: bool, **options: Any) -> None:
     """Find where engines break down as time step, spin, height, inertia ratio, mass, restitution, duration, size or scale varies.
 
-    The default is five scenes (two spins, a ball, a box, a block), with engines and methods that give different results for them; this
-    takes some minutes.
+    The default is five scenes (two spins, a ball, a box, a block), with engines and methods that give different results for them. The
+    default study takes some minutes.
     """
     from dropspin.comparisons.robustness.axes import AXES
     from dropspin.comparisons.robustness.study import SCENES, find_limits

@@ -13,10 +13,10 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
     """Check a recording of tosses by their free flight.
 
     RECORDING is a header, a TOML file that names the body, the units and the file of data; or toss-cube, 100 measured tosses of a cube.
-    Gravity, scale, drag, inertia and centre of mass are found from the flights alone, each with a 95 % interval, and wrong units, axes,
-    orders and rates are named with the remedy; corrected.toml in the output folder is the header with every remedy that has no
-    alternative. If the header has a floor, scenes/ beside it has a scene of each toss and one of all, from the end of the flights on:
-    dropspin run compares engines with the tosses.
+    Gravity, scale, drag, inertia and centre of mass are estimated from the flights alone, each with a 95 % interval. Wrong units, axes,
+    quaternion orders and frame rates are listed with remedies. In the output folder, corrected.toml is the header with every remedy that
+    is the only one for its finding. If the header has a floor, the folder scenes/ has a scene for each toss and one for all tosses, which
+    begin at the end of the flights; dropspin run compares engines with them.
 
     Exit code: 0 no finding, 1 a finding, 2 bad input.
     """

@@ -10,7 +10,9 @@ from dropspin.reports.commands.options import as_json, engines_option, jobs_opti
 @click.command("fit")
 @click.argument("recording", metavar="RECORDING")
 @engines_option
-@click.option("--frames", type=click.IntRange(2, 100), default=8, metavar="N", help="Frames of each toss to use after its flight.")
+@click.option(
+    "--frames", type=click.IntRange(2, 100), default=8, metavar="N", help="Number of frames of each toss to use after its flight."
+)
 @time_limit_option(300.0, "an engine may use for one grid of parameters")
 @jobs_option("engines")
 @output_option("out/log-fit", "for the tables and the report")

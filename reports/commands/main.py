@@ -87,7 +87,7 @@ def _run() -> int:
         return 2
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
-        hint = f" To list what it takes: {context.command_path} --help" if context else ""
+        hint = f" To list the arguments and options: {context.command_path} --help" if context else ""
         message = error.format_message().rstrip(".")
         _say(f"{message}{'' if message.endswith('?') else '.'}{hint}")
         return 2

@@ -40,7 +40,7 @@ def new_adapter_command(name: str, output: str) -> None:
     where = "" if output == "." else f" in {output}"
     echo(f"Written{where}: {name}.py, a working adapter with a toy engine, and test_{name}.py.")
     echo(f"Check them{where}: dropspin conform {name}:{adapter}; pytest test_{name}.py")
-    echo("Then replace the toy engine by yours, and check again: page 'Bring your engine' of the documentation")
+    echo("Then replace the toy engine by yours, and check again; see the page 'Bring your engine' of the documentation")
 
 
 def _class_name(name: str) -> str:

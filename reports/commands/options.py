@@ -119,5 +119,5 @@ def step_option(of: str) -> Callable[[Command], Command]:
 
 def jobs_option(pieces: str) -> Callable[[Command], Command]:
     """The option `-j`: how many pieces of work to do at a time."""
-    text = f"Number of {pieces} at a time; it changes no result. [default: the number of processors]"
+    text = f"Number of {pieces} at a time; the results do not depend on it. [default: the number of processors]"
     return click.option("-j", "--jobs", type=click.IntRange(min=1), metavar="N", help=text)

@@ -26,8 +26,8 @@ def record_command(sent: tuple[str, ...], output: str, jobs: int | None, resourc
     """Measure every release of each engine, in an environment of its own, and keep the results.
 
     pip, or npm, lists the releases and installs each into a temporary environment, in which the same scenes are run with the same
-    settings. A release that the record has already is not run again. With --pre, DIR/prereleases.md says for each engine that has a
-    prerelease after its newest release, or of which --release names two, what changed between them.
+    settings. A release that the record has already is not run again. With --pre, DIR/prereleases.md lists, for each engine, what changed
+    between its newest release and a later prerelease, or between the two releases that --release names.
 
     Exit code: 0 done, 1 with --pre, a result changed or a release has no results, 2 bad input.
     """

@@ -15,8 +15,8 @@ from dropspin.reports.terminal.safe import echo
 def record_publish_command(record: str, output: str) -> None:
     """Write a record as a site: the results of each release of each engine, and what changed.
 
-    RECORD is the folder that dropspin record wrote. The site needs no server and no network. In a folder of the documentation's site, it
-    links to the documentation.
+    RECORD is the folder that dropspin record wrote. The site needs no server and no network. If it is written into a folder of the
+    documentation's site, it links to the documentation.
     """
     from dropspin.comparisons.record.findings import others, read
     from dropspin.comparisons.results.folder import replaced_folder

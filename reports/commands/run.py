@@ -41,7 +41,9 @@ CORE_ENGINES = ("wang", "mujoco", "pybullet")
 @click.option("--symmetries", "test_symmetries", is_flag=True, help="Also test the symmetries of each scene at the finest time step.")
 @time_limit_option(300.0, "an engine may use for one scene at one time step")
 @jobs_option("scenes to run")
-@click.option("--quick", is_flag=True, help="Run few starts, for a first answer from a slow engine; fewer checks are decided.")
+@click.option(
+    "--quick", is_flag=True, help="Run few initial states per scene, for a first answer from a slow engine; fewer checks are decided."
+)
 @within_option
 @baseline_option
 @click.option("--resume", is_flag=True, help="Resume an interrupted run: scenes that are already measured are not run again.")

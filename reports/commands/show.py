@@ -13,8 +13,8 @@ from dropspin.reports.commands.options import as_json, step_option
 def show_command(scene: str, engine_name: str | None, dt: float, json_output: bool) -> None:
     """Show a scene: what it models, its exact solution and its expectations; or the settings of an engine for the scene.
 
-    Of an engine: its options, and the settings of its library that can be given as options. Of a mesh (.obj, .stl): its volume, mass
-    properties, hull and defects.
+    SCENE may also be an engine, to show its options and the settings of its library that can be given as options, or a mesh file (.obj,
+    .stl), to show its volume, mass properties, hull and defects.
     """
     from dropspin.comparisons.engines.registry import engine_names
     from dropspin.reports.document import Document, Table

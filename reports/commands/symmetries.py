@@ -17,13 +17,13 @@ from dropspin.reports.commands.options import as_json, engines_option, jobs_opti
 @output_option("out/symmetries", "for the tables")
 @as_json
 def symmetries_command(scenes: tuple[str, ...], dt: float, output: str, json_output: bool, **options: Any) -> None:
-    """Test whether engines give the same motion for the same scene seen from elsewhere, in other units, or run again.
+    """Test whether engines give the same motion for a scene that is seen from elsewhere, given in other units, or run again.
 
     Each scene is turned, mirrored, moved, described with other body axes and in other units, and run again: in a batch, in a new
     process, on one core, and stopped and continued. If the engine has other representations of body or floor, or can simulate a second
     body far away, these are compared too. No exact solution is needed. The default is seven scenes with wang, mujoco and pybullet.
 
-    Exit code: 0 for any finding, 2 bad input; `dropspin run --symmetries` fails if a symmetry is lost.
+    Exit code: 0 whatever is found, 2 bad input; `dropspin run --symmetries` fails if a symmetry is lost.
     """
     from dropspin.comparisons.symmetries.study import SCENES, symmetries
     from dropspin.reports.html.replay import symmetries_page

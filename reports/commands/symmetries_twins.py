@@ -17,8 +17,8 @@ from dropspin.reports.commands.options import as_json, jobs_option, step_option,
 def symmetries_twins_command(json_output: bool, **options: Any) -> None:
     """Find the time step from which engines of the same algorithm differ, such as MuJoCo and its port to a GPU.
 
-    The motions of each pair of engines are compared at every time step: from which step on they differ at all, by how much before and
-    after the first contact, and whether rounding explains it. No exact solution is needed.
+    The motions of each pair of engines are compared at every time step. The table shows from which step on they differ at all, by how much
+    before and after the first contact, and whether rounding explains the difference. No exact solution is needed.
     """
     from dropspin.comparisons.symmetries.twins import twins
     from dropspin.reports.stories.twins import document

@@ -108,7 +108,7 @@ def test_internal_error_is_exit_code_70(tmp_path):
         (["show", "drop-ball", "-e", "mujoco", "--dt", "0"], "dt: got 0.0 s"),
         (["rnu"], "dropspin: command 'rnu' is unknown. Did you mean 'run'?"),
         (["twins", "drop-ball"], "dropspin: twins is now: dropspin symmetries twins."),
-        (["compare", "old"], "dropspin: Missing argument 'NEW'. To list what it takes: dropspin compare --help"),
+        (["compare", "old"], "dropspin: Missing argument 'NEW'. To list the arguments and options: dropspin compare --help"),
         (["show", "drop-bal"], "Did you mean 'drop-ball'?"),
         (["show", "drop-ball", "-e", "x"], "engine 'x' is unknown"),
         (["list", "planets"], "'planets' is not one of"),

@@ -40,10 +40,10 @@ IN_FRICTION = f"{SQUARE}: in friction, whose impulse is at most µ times that of
 IN_NORMAL = f"{SQUARE}: the separation speed is e times the approach speed"
 REVERSED = "friction has the wrong sign: it reverses the slip of the contact point, and has to reduce it"
 INTO_FLOOR = "restitution has the wrong sign: the contact point goes on into the floor"
-BY_SLIP = "friction takes at most µ (1 + e) times the approach speed from the slip, which is Coulomb's law for a point mass alone"
+BY_SLIP = "friction reduces the slip by at most µ (1 + e) times the approach speed, which follows from Coulomb's law for a point mass only"
 OF_NOTE = (
-    "impacts follow eq 11 and 15 of Wang's lecture note, whose impulse is not normal to the floor; if that is meant, name 'law note' in "
-    "discretisation"
+    "impacts follow eq 11 and 15 of Wang's lecture note, whose impulse is not normal to the floor; if this is intended, name 'law note' "
+    "in discretisation"
 )
 PECULIARITIES = (BY_SLIP, OF_NOTE)
 LATER = "restitution decays from one contact to the next"
@@ -103,7 +103,7 @@ def check_impacts(engine: Engine) -> str:
             raise CheckFailed(f"{mistake} ({name})")
     if not accepted:
         raise Declined(f"the engine declines all scenes: {list(refusals.values())[-1]}")
-    return f"no known mistake explains an impact in {counted(len(accepted), 'scene')}"
+    return f"impacts show no known mistake, in {counted(len(accepted), 'scene')}"
 
 
 def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:

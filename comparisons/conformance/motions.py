@@ -233,7 +233,7 @@ def _of_friction(change: Array, exact: Array) -> Iterator[str]:
     """The size of the friction impulse over the normal one, and its direction."""
     strength, expected = (float(np.linalg.norm(impulse[[0, 2]]) / impulse[1]) for impulse in (change, exact))
     if abs(strength - expected) > CLEAR:
-        yield f"the impulse of friction over that of the normal force is {_instead(strength, expected)}"
+        yield f"the ratio of the friction impulse to the normal impulse is {_instead(strength, expected)}"
     angle = abs(math.remainder(math.atan2(change[0], change[2]) - math.atan2(exact[0], exact[2]), math.tau))
     if strength > CLEAR and expected > CLEAR and angle > TURNED:
         yield f"friction acts {rounded(math.degrees(angle), 2)}° from its exact direction"

@@ -26,6 +26,7 @@ from dropspin.comparisons.running.verification import (
 )
 from dropspin.scenarios import Scenario, load, names
 from dropspin.scenarios.state import Array
+from dropspin.scenarios.text import counted
 
 SEVERAL = 3
 ROUNDING = 1e-9
@@ -51,7 +52,8 @@ def check_refusals(engine: Engine) -> str:
     declined = sum(engine.refusal(scene) is not None for scene in scenes)
     if declined == len(scenes):
         raise CheckFailed(f"every scene of the catalogue is declined; {scenes[0].name}: {engine.refusal(scenes[0])}")
-    return f"{len(scenes) - declined} scenes of the catalogue are accepted, {declined} declined with a reason"
+    accepted = counted(len(scenes) - declined, "scene of the catalogue is", "scenes of the catalogue are")
+    return f"{accepted} accepted, {declined} declined with a reason"
 
 
 def check_builds(engine: Engine) -> str:

@@ -67,7 +67,7 @@ def check_time(engine: Engine) -> str:
         if np.ptp(lengths) <= NEAR_ENOUGH * abs(lengths[0]):
             raise CheckFailed(f"a step is {lengths[0]:.5g} s long for every dt ({asked} s)")
         measured = ", ".join(f"{length:.5g}" for length in lengths)
-        raise CheckFailed(f"steps of {asked} s are {measured} s long, by the motion of a free ball")
+        raise CheckFailed(f"steps of {asked} s are {measured} s long, according to the motion of a free ball")
     with suppress(Declined):
         late = _late(_ticks(engine, "turning", STEPS_TRIED[0], _by_attitude))
         if abs(late) > LATE:
@@ -126,7 +126,7 @@ def check_velocity_lag(engine: Engine) -> str:
     """`velocity_lag` is the time by which velocity lags position, from the displacement and the velocity of a falling body."""
     measured, stated, ahead, noise = _fall(engine)
     if noise > LAG_TOLERANCE:
-        raise Noted(f"a fall does not lag by the same time throughout, but by {noise:.2g} steps more or less")
+        raise Noted(f"the time by which velocity lags position is not constant in a fall: it varies by {noise:.2g} steps")
     if abs(measured) > LARGEST_LAG:
         raise Noted(f"velocity lags position by {measured:.3g} steps; known schemes have at most half a step")
     explicit = f"{EXPLICIT_EULER}; " if abs(measured + 0.5) <= LAG_TOLERANCE else ""
@@ -220,7 +220,7 @@ def check_compilation(engine: Engine) -> str:
     later, compiling, again = second.whole, first.whole - second.whole, other.whole - second.whole
     if not engine.compiles:
         if compiling < MUCH:
-            return "the engine does not compile for long"
+            return "the engine takes no noticeable time to compile"
         raise Noted(f"the first simulation takes {compiling:.2g} s longer than the second; set compiles = True")
     cost = f"a scene compiles in {max(compiling, 0.0):.2g} s; a simulation of {A_FEW_STEPS} steps then takes {rounded(1e3 * later, 2)} ms"
     if again > 0.25 * compiling and again > MUCH / 10.0:  # the first simulation may compile for two numbers of steps, 1 and others

@@ -51,7 +51,7 @@ def rebound(body: LooseBody, dts: Sequence[float], speed: float, quantity: str) 
     if max(change, float(np.ptp(ratios[0]))) > NOTEWORTHY:
         stays = not math.isnan(exact) and abs(means[-1] - exact) >= 0.6 * change
         kind: Kind = "model" if stays else "time step"
-        finest = "" if math.isfinite(limit) or len(dts) < 2 else f"{means[-1]:.3g} at {1e3 * dts[-1]:.3g} ms"
+        finest = "" if math.isfinite(limit) or len(dts) < 2 else f"but {means[-1]:.3g} at {1e3 * dts[-1]:.3g} ms"
         findings = (Finding(kind, (*body.causes.get("impact", ()), "timestep"), detail=finest),)
     answer = Answer("impact", quantity, "1", speed=speed, measured=means[0], in_force=exact, limit=limit, findings=findings)
     return replace(answer, least=float(min(ratios[0])), most=float(max(ratios[0])))

@@ -100,8 +100,9 @@ class MuJoCoFile:
         found = wanted or [name for name in heavy if loose or self.is_free(self.heads[name]) or (self.is_urdf and len(heavy) == 1)]
         if not found:
             if not heavy:
-                raise DropspinError(f"{self.given}: no body moves and has mass; give a body a free joint and a mass.")
-            there = f"{', '.join(heavy[:MOST_NAMES])}{' and others' * (len(heavy) > MOST_NAMES)} move on joints or are tied"
+                raise DropspinError(f"{self.given}: no body both moves and has mass; give a body a free joint and a mass.")
+            are = "moves on joints or is tied" if len(heavy) == 1 else "move on joints or are tied"
+            there = f"{', '.join(heavy[:MOST_NAMES])}{' and others' * (len(heavy) > MOST_NAMES)} {are}"
             raise DropspinError(f"{self.given}: no body is free: {there}; name one with --body, or give --loose for all.")
         return list(found)
 

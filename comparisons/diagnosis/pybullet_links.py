@@ -104,7 +104,7 @@ class Link:
         """
         written = self.written
         if written is None:
-            yield "inertial", Setting("no inertial", self.element.file, self.element.line), f"{self.mass:g} kg"
+            yield "inertial", Setting("no inertial", self.element.file, self.element.line), f"missing: the mass is {self.mass:g} kg"
         elif np.abs(written - self.inertia).max() > SAME * np.abs(written).max():
             moments = ", ".join(f"{moment:.3g}" for moment in self.dynamics[2])
             times = " times <inertia_scaling>" if next(self.element.every("inertia_scaling"), None) else ""
@@ -117,7 +117,8 @@ class Link:
             if not is_read:
                 yield element.tag, element.words, "not read, because it is not within <contact>"
             elif element.tag == "restitution" and self.restitution * restitution != self.restitution:
-                yield element.tag, element.words, f"is {self.restitution * restitution:g}, the product with {restitution:g} of {surface}"
+                of_surface = f"the product with the restitution {restitution:g} of {surface}"
+                yield element.tag, element.words, f"{self.restitution * restitution:g}, {of_surface}"
         for collision in self.element.every("collision"):
             for element in collision.every("cylinder"):
                 yield "cylinder", element.words, f"replaced by the convex hull of 64 points, with a margin of {MARGIN:g} m"

@@ -105,7 +105,7 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
         tried.append((interval / division, run[0]))
         spent += run[1]
         if stalled := _stalled([errors[0] for _, errors in tried if np.isfinite(errors[0])]):
-            ended, reason = "error_stopped_falling", f"over the last {stalled} steps the error fell by less than a fifth per step"
+            ended, reason = "error_stopped_falling", f"at the last {stalled} time steps the error fell by less than a fifth each"
             break
         if spent >= budget:
             ended, reason = "budget", f"the budget of {budget:g} s of processor time was spent"

@@ -75,7 +75,7 @@ class MyEngineBatch(ds.BatchSimulation):
         return rotated(cross(self.moments * w, w) / self.moments, self.q)
 
     def collide(self, hit: NDArray[np.bool_], restitution: float, friction: float, rest_speed: float) -> None:
-        """Apply the impulses of the floor: Newton's restitution, and Coulomb's friction against the slip of the contact point."""
+        """Apply the impulses of the floor: Newton's restitution, and Coulomb friction against the slip of the contact point."""
         v, w, arm, moment = self.v[hit], self.w[hit], np.array([[0.0, -self.radius, 0.0]]), self.moments[0]
         normal = -self.mass * v[:, 1] * (1.0 + np.where(-v[:, 1] >= rest_speed, restitution, 0.0))
         slip = (v + cross(w, arm)) * [1.0, 0.0, 1.0]

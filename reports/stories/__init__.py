@@ -1,1 +1,1 @@
-"""Results as sentences and table rows, without HTML and terminal codes; one file for each command."""
+"""Modules that turn results into sentences and table rows, without HTML or terminal codes; most commands have a module of their own."""

@@ -1,4 +1,4 @@
-"""The output of `dropspin bugs`: each public report with what its releases did, and the verdicts on all."""
+"""The output of `dropspin bugs`: for each public bug report the results of the releases, and a table of all verdicts."""
 
 import math
 from collections import Counter
@@ -17,7 +17,7 @@ FEW = 4
 
 
 class KnownBugs(Study):
-    """What `dropspin bugs` found, report by report."""
+    """The results of `dropspin bugs` for each report."""
 
     study: Literal["bugs"] = "bugs"
     bugs: list[Bug]
@@ -28,7 +28,7 @@ class KnownBugs(Study):
         return [(bug, verdict(bug, self.outcomes[bug.name])) for bug in self.bugs]
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each release of each report; one for a report without a release."""
+        """A row for each release of each report; a report without a release has one row."""
         blank = Outcome(release="", state="not run")
         return [
             {"case": bug.name, "kind": bug.kind, "reference": bug.reference, "command": bug.command if bug.label else ""}
@@ -39,7 +39,7 @@ class KnownBugs(Study):
         ]
 
     def document(self) -> Document:
-        """Each report with its releases, and a table of all."""
+        """Each report with its releases, and a table of the verdicts on all reports."""
         verdicts = self.verdicts()
         parts: list[Part] = []
         for bug, outcome in verdicts:
@@ -50,7 +50,7 @@ class KnownBugs(Study):
 
 
 def _of_bug(bug: Bug, result: Verdict, outcomes: Sequence[Outcome], *, on_terminal: bool) -> list[Part]:
-    """One report."""
+    """The parts of the page on one report."""
     parts: list[Part] = [
         Heading(f"{bug.name}: {bug.kind}", on_terminal=on_terminal),
         Paragraph(f"{bug.symptom}. Reported in {bug.year}: {bug.reference}", on_terminal=on_terminal),
@@ -72,7 +72,7 @@ def _row(bug: Bug, outcome: Outcome) -> dict[str, str]:
 
 
 def _said(bug: Bug, outcomes: Sequence[Outcome]) -> list[str]:
-    """What the command printed in the newest release that shows the fault, or why nothing; and why releases were not run."""
+    """The check that fails in the newest release with the fault, or why no check fails; and why releases were not run."""
     shown = [outcome for outcome in outcomes if outcome.state == "shown"]
     printed = [f"Failed check: {shown[-1].said}" if shown[-1].said else "No check fails."] if shown else []
     silent = [f"The checks of the catalogue's scenes do not detect the fault: {bug.silent}."] if bug.silent else []
@@ -82,12 +82,12 @@ def _said(bug: Bug, outcomes: Sequence[Outcome]) -> list[str]:
 def words(bug: Bug, result: Verdict) -> str:
     """A verdict in words."""
     if result.kind == "fixed":
-        return f"no longer occurs since {result.since}"
+        return f"does not occur from release {result.since} on"
     return f"not expressible: {bug.why_not}" if result.kind == "not expressible" else result.kind
 
 
 def _summary(verdicts: Sequence[tuple[Bug, Verdict]]) -> str:
-    """How many reports have which verdict."""
+    """The number of reports with each verdict."""
     kinds = Counter(verdict.kind for _, verdict in verdicts)
     catalogue = sum(verdict.kind in ("shown", "fixed") and not bug.silent for bug, verdict in verdicts)
     of_these = f"{kinds['fixed']} fixed in a later release and {catalogue} detected by a check of the catalogue's scenes"
@@ -97,6 +97,6 @@ def _summary(verdicts: Sequence[tuple[Bug, Verdict]]) -> str:
 
 
 def exit_code(verdicts: Sequence[tuple[Bug, Verdict]]) -> int:
-    """1 if a release does not do what was reported, 3 if one could not be run, otherwise 0."""
+    """1 if the releases do not show a fault as reported, 3 if a release could not be run, otherwise 0."""
     kinds = {verdict.kind for _, verdict in verdicts}
     return 1 if "not shown" in kinds else 3 if "not run" in kinds else 0

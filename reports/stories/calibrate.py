@@ -10,7 +10,7 @@ from dropspin.scenarios import DropspinError
 
 
 def friction(text: str) -> str | float:
-    """The value of the option `--friction` as a floor's friction.
+    """The value of the option `--friction` as the friction of a floor.
 
     Raises:
         DropspinError: The value is not a valid friction.
@@ -24,7 +24,7 @@ def friction(text: str) -> str | float:
 
 
 def document(calibration: Calibration) -> Document:
-    """The values that were measured with the calibrated settings; the settings and the reasons for them."""
+    """A table of the values measured with the calibrated settings, and a table of these settings with their reasons."""
     measured = [{"measured": result.name, "value": _value(result), "how": result.how} for result in calibration.measured]
     settings = [{"set": name, "to": str(value), "why": calibration.reasons.get(name, "")} for name, value in calibration.settings.items()]
     return Document(calibration.engine, [Table(measured), Table(settings)])

@@ -1,4 +1,4 @@
-"""The output of `dropspin check` and `accept`: the outcome of a check."""
+"""The output of `dropspin check` and `dropspin accept`: the outcome of the checks, and the results that were accepted."""
 
 import shlex
 from collections.abc import Sequence
@@ -21,10 +21,10 @@ JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
 
 
 def document(checked: Checked, failures: Sequence[Failure], run: str, baseline: str | None) -> Document:
-    """The failures of each engine, and the outcome of a check; on a page also the numbers of the checks and the versions.
+    """The failures of each engine, and the outcome of the checks; a page also has the number of checks by verdict, and versions.
 
     Args:
-        checked: The outcome.
+        checked: The outcome of the checks.
         failures: The failures to list.
         run: The folder of the run, as it appears in printed commands.
         baseline: The file of the baseline; None without one.
@@ -40,7 +40,7 @@ def document(checked: Checked, failures: Sequence[Failure], run: str, baseline: 
 
 
 def _tally(results: Results, engine: str) -> dict[str, str]:
-    """The number of checks of an engine with each verdict, and of those in which it broke down or is missing."""
+    """The number of checks of an engine by verdict, and the number of rows in which it broke down or is missing."""
     mine = results.table["engine"] == engine
     numbers = results.table.loc[mine, "verdict"].value_counts()
     verdicts = {verdict: str(numbers.get(verdict, 0)) for verdict in ("passed", "failed", "known", "limited")}
@@ -48,7 +48,7 @@ def _tally(results: Results, engine: str) -> dict[str, str]:
 
 
 def sentences(checked: Checked, run: str, baseline: str | None) -> list[str]:
-    """The outcome of a check, the verdict last; the arguments are those of `document`."""
+    """Sentences on the outcome of the checks, the verdict last; the arguments are those of `document`."""
     table = checked.results.table
     without_baseline = replace(checked.results, table=table[table["kind"] != "baseline"])
     known = int((without_baseline.table["basis"] == "accepted_failure").sum())
@@ -69,7 +69,7 @@ def sentences(checked: Checked, run: str, baseline: str | None) -> list[str]:
         are = counted(len(checked.not_run), "accepted result is", "accepted results are")
         notes.append(f"{are} not covered by this run ({counted(pairs, 'scene–engine pair')}).")
     if known:
-        notes.append(f"{counted(known, 'known failure')}, not counted as failed.")
+        notes.append(f"{counted(known, 'known failure is', 'known failures are')} not counted as failed.")
     acceptable = (~(broke_down(failed_rows, checked.results) & (failed_rows["metric"] == ""))).any()
     if acceptable or {"better", "new"} & set(changes.index):
         command = shlex.join(["dropspin", "accept", run, "--baseline", baseline, "--reason"])
@@ -78,7 +78,7 @@ def sentences(checked: Checked, run: str, baseline: str | None) -> list[str]:
 
 
 def _verdict(checked: Checked, failed_rows: pd.DataFrame, verdict: str) -> str:
-    """The last sentence: the verdict on the accepted results beside that on the run's other checks."""
+    """The last sentence: the verdict on the accepted results and on the other checks of the run."""
     failed = len(regressed(checked.changes))
     judged = int(checked.changes["change"].isin(["same", "better"]).sum()) + failed
     changed = failed_rows.loc[failed_rows["basis"] == "scene_changed", "scene"].nunique()
@@ -101,11 +101,12 @@ def accepted_sentences(results: Results, accepted: pd.DataFrame, known_failures:
     unknown = tally.failed - acceptable
     if tally.failed and not known_failures:
         fail = counted(tally.failed, "check of this run fails", "checks of this run fail")
-        those = f"the {acceptable:,} with comparable results" if unknown else "them"
-        notes.append(f"{fail}, so dropspin check will fail too; --known-failures accepts {those} as known failures.")
+        those = f"the {acceptable:,} with comparable results" if unknown else "it" if tally.failed == 1 else "them"
+        remedy = f"; --known-failures accepts {those} as known failures" if acceptable else ""
+        notes.append(f"{fail}, so dropspin check will fail too{remedy}.")
     if unknown and known_failures:
         have = counted(unknown, "failing check has", "failing checks have")
         notes.append(f"{have} no comparable result and cannot be accepted.")
     if tally.broken:
-        notes.append(f"{counted(tally.broken, 'engine run')} broke down; results accepted earlier for them stay in the baseline.")
+        notes.append(f"{counted(tally.broken, 'engine run')} broke down; results that were accepted earlier stay in the baseline.")
     return notes

@@ -19,7 +19,7 @@ MOST_LINES = 12
 
 
 def document(changes: Changes, results: Results) -> Document:
-    """The changes of each kind, notes, and the verdict; on a terminal also the commands that run the scenes of regressions again."""
+    """The changes of each kind, notes and the verdict; a terminal also shows the commands that run scenes with worse results again."""
     by_engine = changes.regressions.groupby("engine", sort=False)["scene"].unique()
     commands = [
         Paragraph("Reproduce:", reproduce_scenes(results, list(scenes), str(engine)), on_page=False) for engine, scenes in by_engine.items()
@@ -32,17 +32,19 @@ def document(changes: Changes, results: Results) -> Document:
 def _verdict(changes: Changes) -> str:
     regressed, total = len(changes.regressions), counted(len(changes.results), "result")
     are = "is" if regressed == 1 else "are"
-    return f"{regressed:,} of {total} {are} worse, moved or gone." if regressed else f"None of {total} is worse."
+    if regressed:
+        return f"{regressed:,} of {total} {are} worse, moved or gone."
+    return "The result is not worse." if len(changes.results) == 1 else f"None of {total} is worse."
 
 
 def _tables(changes: Changes) -> list[Part]:
-    """The changes of each kind, a row for each engine and scene with the largest change."""
+    """A table for each kind of change, with the largest change of each engine in each scene."""
     parts: list[Part] = []
     for change, word in TITLES.items():
         changed = changes.of(change)
         groups = [group for _, group in changed.groupby(["engine", "scene"], sort=False)]  # which probably have one cause
         if groups:
-            more = f", the first {MOST_LINES} of {len(groups)} scenes and engines" if len(groups) > MOST_LINES else ""
+            more = f", the first {MOST_LINES} of {len(groups)} pairs of a scene and an engine" if len(groups) > MOST_LINES else ""
             rows = [_row(group.iloc[0].to_dict(), len(group)) for group in groups[:MOST_LINES]]
             parts.append(Heading(f"{word}: {counted(len(changed), 'result')}{more}", on_terminal=True))
             parts.append(Table(rows))
@@ -60,7 +62,7 @@ def change_cells(row: Mapping[Hashable, Any]) -> dict[str, str]:
 
 
 def _row(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
-    """The largest change of an engine in a scene, and the number of others."""
+    """The largest change of an engine in a scene, and the number of its other changes in this scene."""
     before, after = row["before"], row["value"]
     ratio = abs(after / before) if abs(before) > row["tolerance"] else math.inf  # a ratio of rounding errors is meaningless
     return {
@@ -74,7 +76,7 @@ def _row(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
 
 
 def _notes(changes: Changes) -> list[str]:
-    """Sentences on the attributions, the scenes that were not compared, the speeds, and the motions."""
+    """Sentences on the causes of changes, the scenes that were not compared, the speeds, and the motions."""
     notes = []
     for engine, cause in changes.attributions.items():
         kinds = changes.results.loc[changes.results["engine"] == engine, "change"]
@@ -85,7 +87,7 @@ def _notes(changes: Changes) -> list[str]:
     if changes.other_scenes:
         notes.append(f"Not compared, because these scenes have changed: {', '.join(changes.other_scenes)}.")
     if changes.in_one_only:
-        notes.append(f"In one of the runs only: {', '.join(changes.in_one_only)}.")
+        notes.append(f"Not compared, because only one of the runs has them: {', '.join(changes.in_one_only)}.")
     notes += map(_speed, changes.speed)
     return notes + ([f"Motions equal bit for bit: {'; '.join(map(_motions, changes.motions))}."] if changes.motions else [])
 
@@ -93,7 +95,7 @@ def _notes(changes: Changes) -> list[str]:
 def _speed(change: SpeedChange) -> str:
     between = f"{change.least:.2f} to {change.most:.2f}" if math.isfinite(change.most) else "unbounded with so few cases"
     return (
-        f"Speed (reported, not gated): {change.engine} relative to {change.other} takes {change.ratio:.2f} times as long as before "
+        f"Speed (reported, not gated): relative to {change.other}, {change.engine} takes {change.ratio:.2f} times as long as before "
         f"(median of {counted(change.cases, 'case')}, 95 % interval {between})."
     )
 

@@ -21,11 +21,13 @@ def document(results: Sequence[CheckResult]) -> Document:
     """Sentences on error messages that several checks share, the most frequent first, and on how many checks fail."""
     errors = Counter(result.message for result in results if result.outcome in WRONG)
     declined = sum(result.outcome == "declined" for result in results)
-    shared = [f"{count} checks have one error: {error}" for error, count in errors.most_common() if count > 1]
+    shared = [f"{count} checks have the same error: {error}" for error, count in errors.most_common() if count > 1]
     if errors:
         outcome = failing(errors.total(), len(results), "check")
         outcome += f", with {counted(len(errors), 'different message')}" if shared else ""
+    elif len(results) == 1:
+        outcome = "The check does not fail" + ("; it tested nothing, for the reason given" if declined else "")
     else:
-        outcome = "The check does not fail" if len(results) == 1 else f"None of {len(results)} checks fails"
-        outcome += f"; {declined} tested nothing, for the reasons given" if declined else ""
+        reasons = "the reason" if declined == 1 else "the reasons"
+        outcome = f"None of {len(results)} checks fails" + (f"; {declined} tested nothing, for {reasons} given" if declined else "")
     return Document("Checks of an adapter", [Sentences([*shared, f"{outcome}."])])

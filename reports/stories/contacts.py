@@ -1,4 +1,4 @@
-"""The contacts of a scene: for each engine, the largest violation of each law of contact, and the time of the contact that has it."""
+"""The contacts of a scene: for each engine, the largest violation of each law of contact, and the start of the contact that has it."""
 
 import math
 
@@ -12,9 +12,9 @@ from dropspin.reports.stories.numbers import formatted
 
 @np.errstate(all="ignore")  # an engine may return 1e300
 def worst_contacts(results: Results, scene_name: str) -> list[dict[str, str]]:
-    """A row for each engine that touches the floor at the finest time step: its contacts, and the worst for each law.
+    """A row for each engine whose body touches the floor at the finest time step: the number of contacts, and the worst for each law.
 
-    The motion is that from the scene's own start. Empty if the forces of the floor cannot be computed.
+    The motion is the one from the initial state of the scene. The list is empty if the forces of the floor cannot be computed.
     """
     scene = results.scenes[scene_name]
     if not obeys_contact_laws(scene, None):
@@ -32,7 +32,7 @@ def worst_contacts(results: Results, scene_name: str) -> list[dict[str, str]]:
 
 
 def _worst(values: list[float], times: list[float]) -> str:
-    """The largest value, with its time [s] unless it is 0; – if a value is undefined, as the cone of infinite friction is."""
+    """The largest value, with its time [s] if it is not 0; – if a value is undefined, such as the cone excess with infinite friction."""
     if any(map(math.isnan, values)):
         return "–"
     largest = max(values)

@@ -1,4 +1,4 @@
-"""The output of `dropspin diagnose`: for one body, its answers beside the exact values; for several, a table of all; then the findings."""
+"""The output of `dropspin diagnose`: the measured and exact values of one body, or a table of several bodies; then the findings."""
 
 import math
 from collections.abc import Sequence
@@ -18,25 +18,25 @@ from dropspin.reports.stories.study import Study
 from dropspin.scenarios.text import counted
 
 KINDS = {"changed": "changed by the engine", "model": "engine", "target": "target missed"}
-"""The words for some kinds of findings; for others their names."""
+"""The words for kinds of findings that are not shown by their names."""
 LEAST = 1e-9
-"""Values below this are rounding, except moments of inertia."""
+"""Values below this size are shown as 0, except moments of inertia."""
 STARTS = {"slide": (" from", " at"), "roll": (" from", "")}
-"""What stands before the speed and the direction of a start, if not `at` and `about`."""
+"""The prepositions before an initial speed and before a direction, for questions that do not take `at` and `about`."""
 COLUMNS = (
-    "dt = …: measured at this time step. Exact: the exact solution with the damping, armature and margin in force. "
-    "Ideal: the exact solution without these. In parentheses: the range over eight phases of the impact within a time step."
+    "dt = …: the value measured at this time step. Exact: the exact solution with the damping, armature and contact margin that the engine "
+    "uses. Ideal: the exact solution without these. In parentheses: the range over impacts at eight instants within a time step."
 )
 
 
 class Diagnosed(Study):
-    """What `dropspin diagnose` found."""
+    """The results of `dropspin diagnose`."""
 
     study: Literal["diagnosis"] = "diagnosis"
     diagnosis: Diagnosis
 
     def rows(self) -> list[dict[str, Any]]:
-        """Every answer, once for each of its findings, with where the settings are written."""
+        """A row for each measured value and finding, with the places in the file where the settings are written."""
         rows = []
         for body in self.diagnosis.bodies:
             of_body = {"file": self.diagnosis.file, "body": body.name, "engine": body.engine, "version": body.version, "dt": body.dt}
@@ -46,7 +46,7 @@ class Diagnosed(Study):
         return rows
 
     def document(self) -> Document:
-        """The answers of one body, or a table of several; what differs between engines; and the findings."""
+        """The measured values of one body or a table of several bodies, the differences between engines, and the findings."""
         bodies, parts = self.diagnosis.bodies, list[Part]()
         by_name, measured = grouped(bodies, lambda body: body.name), [body for body in bodies if not body.breakdown]
         parts.append(Paragraph(COLUMNS, on_terminal=False))
@@ -69,7 +69,7 @@ def _kind(finding: Finding) -> str:
 
 
 def _finding_cells(body: BodyDiagnosis, answer: Answer, finding: Finding | None) -> dict[str, str]:
-    """The columns of a finding, empty for none."""
+    """The columns of a finding; they are empty if there is no finding."""
     if finding is None:
         return {"finding": "", "settings": "", "shares": "", "remedies": "", "reason": ""}
     remedies = "; ".join(_remedies((answer, finding)))
@@ -78,11 +78,11 @@ def _finding_cells(body: BodyDiagnosis, answer: Answer, finding: Finding | None)
 
 
 def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
-    """What a page says of a body; a terminal that shows a table of several bodies does not show it."""
+    """The parts of a page on one body. With several bodies, a terminal shows a table instead, and `on_terminal` is false."""
     if body.breakdown:
         return [Paragraph(f"{body.name}: {body.breakdown.removesuffix('.')}.", style="bold", on_terminal=on_terminal)]
-    others = f" (or {listed(body.others)}, by --on)" if body.others else ""
-    lands = f"; lands on {body.surface}{others}, friction {body.friction:g}" if body.surface else "; lands on nothing"
+    others = f" (--on can choose {listed(body.others)})" if body.others else ""
+    lands = f"; lands on {body.surface}{others}, friction {body.friction:g}" if body.surface else "; lands on no surface"
     described = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg"
     head = f"{described}; {body.engine} {body.version}, time step {in_ms(body.dt)}{lands}."
     drawn = charts(body)
@@ -96,12 +96,12 @@ def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
 
 
 def _left_out(body: BodyDiagnosis) -> list[str]:
-    """What the simulations leave out."""
-    return [f"Not modelled: {', '.join(body.unmodelled)} of the file."] if body.unmodelled else []
+    """The parts of the file that the simulations leave out."""
+    return [f"Not simulated: {', '.join(body.unmodelled)} of the file."] if body.unmodelled else []
 
 
 def of_several(bodies: Sequence[BodyDiagnosis]) -> list[str]:
-    """The findings of several bodies, or of one in several engines; those with the same finding together."""
+    """The findings of several bodies or engines: one sentence for all that have the same finding."""
     owners: dict[str, list[str]] = {}
     engines, names = {body.engine for body in bodies}, {body.name for body in bodies}
     for body in bodies:
@@ -124,7 +124,7 @@ def _overview(body: BodyDiagnosis) -> dict[str, str]:
 
 
 def answer_rows(body: BodyDiagnosis) -> list[dict[str, str]]:
-    """The answers with a value; those about several axes or speeds in one row if they are equal, and the moments of inertia in one row."""
+    """A row for each measured value. Equal values for several axes or speeds share a row, as do the moments of inertia."""
     rows = []
     moments = [answer for answer in body.answers if answer.quantity == MOMENT]
     ratios = [formatted(answer.measured / answer.physical) for answer in moments]
@@ -144,7 +144,7 @@ def _row(body: BodyDiagnosis, question: str, quantity: str, measured: str, in_fo
 
 
 def _cells(answer: Answer) -> tuple[str, str, str]:
-    """The measured value, with the range over start phases, and both exact ones."""
+    """The measured value with its range over start phases, and the two exact values."""
     measured = answer.detail if answer.detail and not math.isfinite(answer.measured) else _value(answer.measured, answer.unit)
     if answer.most - answer.least > 0.0:
         measured += f" ({formatted(answer.least)} to {formatted(answer.most)})"
@@ -152,7 +152,7 @@ def _cells(answer: Answer) -> tuple[str, str, str]:
 
 
 def _value(value: float, unit: str) -> str:
-    """A value with its unit, small lengths and times in mm and ms; nothing for one that is not known."""
+    """A value with its unit, small lengths and times in mm and ms; empty if the value is not known."""
     if math.isnan(value):
         return ""
     if math.isinf(value):
@@ -167,7 +167,7 @@ def _value(value: float, unit: str) -> str:
 
 
 def sentences(body: BodyDiagnosis) -> list[str]:
-    """A sentence for each finding: what is wrong, the settings in the words of the file with their lines, and the remedy that was tried."""
+    """A sentence for each finding: what is wrong, the settings that cause it, quoted from the file with their lines, and the remedies."""
     lines = []
     for same in grouped(body.findings, _shared).values():
         question, finding = same[0][0].question, same[0][1]
@@ -180,13 +180,13 @@ def sentences(body: BodyDiagnosis) -> list[str]:
 
 
 def _shared(pair: tuple[Answer, Finding]) -> tuple[object, ...]:
-    """What findings that one sentence names together have in common."""
+    """The properties by which findings are grouped into one sentence."""
     answer, finding = pair
     return answer.question, finding.kind, finding.settings, tuple(remedy.text for remedy in finding.remedies)
 
 
 def _together(answers: Sequence[Answer]) -> str:
-    """The quantities of answers, those that differ in the speed or the direction of the start as one."""
+    """The measured quantities; those that differ only in the initial speed or direction are joined."""
     quantities = []
     for quantity, same in grouped(answers, lambda answer: answer.quantity).items():
         from_speed, along = STARTS.get(same[0].question, (" at", " about"))
@@ -198,7 +198,7 @@ def _together(answers: Sequence[Answer]) -> str:
 
 
 def _remedies(*same: tuple[Answer, Finding]) -> list[str]:
-    """A sentence for each remedy of equal findings, with the values measured with it."""
+    """A sentence for each remedy that the findings share, with the values measured with this remedy."""
     lines = []
     for remedies in zip(*(finding.remedies for _, finding in same), strict=True):
         pairs = zip(remedies, (answer for answer, _ in same), strict=True)
@@ -206,27 +206,28 @@ def _remedies(*same: tuple[Answer, Finding]) -> list[str]:
         first = remedies[0]
         text = f"Remedy: {first.text}" if math.isnan(first.value) else f"Remedy, tried: {first.text} gives {', '.join(values)}"
         if first.others or not first.runs:
-            others, runs = counted(first.others, "other body", "other bodies"), "runs" if first.runs else "breaks down"
-            text += f" (it applies to {others} too, and the whole model {runs} with it)"
+            also = f"it also applies to {counted(first.others, 'other body', 'other bodies')}, and " if first.others else ""
+            text += f" ({also}the whole model {'runs' if first.runs else 'breaks down'} with it)"
         lines.append(f"{text}.")
-
     return lines
 
 
 def _value_after(remedy: Remedy, answer: Answer) -> str:
-    """The value measured with a remedy: a spin that does not decay has no time of its decay, but a fraction that is kept."""
+    """The value measured with a remedy. A spin that does not decay has no decay time; the fraction that it keeps is shown instead."""
     value = _value(remedy.value, remedy.unit)
-    return value if remedy.unit == answer.unit else f"a fraction of {value} kept in 1 s"
+    return value if remedy.unit == answer.unit else f"a spin of which the fraction {value} is left after 1 s"
 
 
 def _statement(pair: tuple[Answer, Finding]) -> str:
-    """What a sentence states of a quantity."""
+    """The statement on a quantity: its measured value, and the expected value or the reason."""
     answer, finding = pair
     measured, in_force, physical = _cells(answer)
     if finding.kind == "impossible":
         return f"is {measured}, but {finding.detail}"
+    if finding.kind == "changed":
+        return f"is {finding.detail}"
     if finding.detail:
-        return f"is {measured}, {finding.detail}" if measured else finding.detail
+        return f"is {measured}, {finding.detail}" if measured else f"of the simulation: {finding.detail}"
     wanted = in_force if finding.is_error and in_force else physical
     limit = f", {_value(answer.limit, answer.unit)} as dt → 0" if finding.kind == "time step" and math.isfinite(answer.limit) else ""
     shares = f" ({explained_by(dict(finding.shares), 'of the difference')})" if finding.shares else ""
@@ -239,7 +240,7 @@ def _settings(body: BodyDiagnosis, finding: Finding) -> list[str]:
 
 
 def differences(bodies: Sequence[BodyDiagnosis]) -> list[dict[str, str]]:
-    """The answers in which engines differ, a column for each."""
+    """The measured values in which engines differ, with a column for each engine."""
     by_quantity: dict[str, dict[str, str]] = {}
     for body in bodies:
         for answer in (answer for answer in body.answers if answer.question != "file"):
@@ -251,15 +252,16 @@ def differences(bodies: Sequence[BodyDiagnosis]) -> list[dict[str, str]]:
 
 
 def summary(diagnosis: Diagnosis) -> str:
-    """The number of findings and of bodies that have any."""
+    """The number of findings of each kind, and the number of bodies without a result."""
     kinds = [_kind(finding) for body in diagnosis.bodies for _, finding in body.findings]
     text = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
     broken = sum(bool(body.breakdown) for body in diagnosis.bodies)
-    return f"{counted(len(kinds), 'finding')}{f' ({text})' if text else ''}{f'; {broken} without a result' if broken else ''}."
+    without = f"; {counted(broken, 'body', 'bodies')} without a result" if broken else ""
+    return f"{counted(len(kinds), 'finding')}{f' ({text})' if text else ''}{without}."
 
 
 def charts(body: BodyDiagnosis) -> list[Chart]:
-    """The rebound over the impact speed, with its range over start phases, if there is a rebound."""
+    """A chart of the rebound over the impact speed, with its range over start phases; empty if the body does not rebound."""
     impacts = [answer for answer in body.answers if answer.quantity == REBOUND]
     if not any(answer.most > 0.0 for answer in impacts):
         return []

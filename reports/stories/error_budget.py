@@ -1,4 +1,4 @@
-"""The error budget of each error in words: the asymptotic error with its interval, and the cause."""
+"""The error budgets of a scene: for each error the asymptotic error with its interval, the cause, and a sentence."""
 
 import math
 from collections.abc import Hashable, Mapping
@@ -13,14 +13,14 @@ from dropspin.reports.stories.numbers import formatted, observed_order
 
 OF = ["metric", "engine"]
 EXPLAINED = {"known": "Expected", "limited": "Known limitation"}
-"""How the reason of an expected model error begins, by verdict."""
+"""The words before the reason of an expected model error, by verdict."""
 
 
 def error_budgets(results: Results, scene_name: str) -> list[dict[Hashable, Any]]:
     """The errors of a scene at the finest time step, by metric, for engines that ran at enough time steps.
 
-    Negligible errors that vanish are left out. A row has the columns of the error, those of its asymptotic error and of its order (with
-    the endings `_of_limit` and `_of_order`; NaN where it is undefined), the cause to which the error is attributed, and a sentence.
+    Negligible errors that vanish as dt → 0 are left out. A row has the columns of the error, of its asymptotic error (names that end in
+    `_of_limit`) and of its order (`_of_order`), which are NaN if undefined; the cause to which the error is attributed; and a sentence.
     """
     table = results.table[results.table["scene"] == scene_name]
     errors = table[table["kind"].isin(["truth", "invariant"]) & ~table["metric"].isin(ARTEFACTS)]
@@ -44,11 +44,11 @@ def _sentence(row: Mapping[Hashable, Any]) -> str:
             return "Undecided: the angle is near π, where it saturates."
         return "Undecided: too few usable time steps." if math.isnan(limit) else f"Undecided: {row['reason_of_limit']}."
     if cause == "rounding":
-        return "Within rounding."
+        return "Within rounding error."
     if cause == "discretisation":
         reach = max(-float(row["lower_of_limit"]), float(row["upper_of_limit"]))
         if reach > abs(value):
-            return f"Discretisation error down to {formatted(reach)}; the time steps do not resolve smaller ones."
+            return f"Attributed to discretisation, although the time steps bound the asymptotic error only by {formatted(reach)}."
         ends = (float(row[f"{end}_of_order"]) for end in ("lower", "upper"))
         order = observed_order(float(row["value_of_order"]), *ends)
         halved = f" of {order}: halving dt gives about {formatted(value * 0.5 ** row['value_of_order'])}" if order else ""
@@ -56,10 +56,10 @@ def _sentence(row: Mapping[Hashable, Any]) -> str:
     if cause == WITHIN_UNCERTAINTY:
         return "Within the uncertainty of the recording."
     if cause == COMBINED:
-        return f"At least {formatted(row['lower_of_limit'])} is due to the model, the settings and the start together."
+        return f"At least {formatted(row['lower_of_limit'])} is due to the model, the settings and the initial state together."
     if cause not in ("model", "setting"):
         return f"Due to {cause}, an option of the engine: the error {row['reason_of_limit']}."
-    a_setting, a_model = "setting error: the calibrated profile has none or a smaller one", "model error, which no time step removes"
+    a_setting, a_model = "setting error, which calibrated settings reduce or remove", "model error, which no time step removes"
     kind = a_setting if cause == "setting" else a_model
     rest = value - limit
     because = f" {EXPLAINED[row['verdict_of_limit']]}: {row['reason_of_limit']}." if row["verdict_of_limit"] in EXPLAINED else ""

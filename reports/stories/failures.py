@@ -19,7 +19,7 @@ from dropspin.scenarios.text import counted, rounded
 
 Row = Mapping[Hashable, Any]
 MOST_ON_PAGE, MOST_ON_TERMINAL = 24, 6
-"""Largest number of sentences on the failures of one engine; JUnit, JSON and the report have all failures."""
+"""Largest number of sentences on the failures of one engine, on a page and on a terminal; JUnit, JSON and the report have all failures."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class Failure:
         others: Number of other rows, at other time steps, that fail in the same way.
         reproduce: The command, or the call, that reproduces it.
         broke_down: Whether the engine crashed, hung, diverged, or is missing.
-        accepted: Whether the failure is of an accepted result.
-        of_symmetry: Whether the failure is of a symmetry or of a repeated run.
+        accepted: Whether it is an accepted result that fails.
+        of_symmetry: Whether it is a symmetry or a repeated run that fails.
     """
 
     scene: str
@@ -94,9 +94,9 @@ def _failure(results: Results, group: Sequence[Row], baseline: str | None) -> Fa
 
 
 def failure_parts(results: Results, failures: Sequence[Failure], baseline: str | None = None) -> list[Part]:
-    """The failures of each engine: what explains its asymptotic errors, a sentence for each cause, and one command for all its scenes.
+    """For each engine: what explains its asymptotic errors, a sentence for each cause of failures, and one command that reproduces them.
 
-    The failures of a scene probably have one cause; equal breakdowns of an engine in several scenes are one failure.
+    Failures of an engine in one scene are assumed to have one cause, and so are breakdowns with the same message in several scenes.
     """
     broken = {(failure.scene, failure.engine) for failure in failures if failure.broke_down}
     # Accepted results of an engine that broke down are gone because it broke down.
@@ -119,21 +119,21 @@ def failure_parts(results: Results, failures: Sequence[Failure], baseline: str |
 
 
 def _consistent_with(results: Results, engine: str) -> list[str]:
-    """A sentence with the wrong parameters and faults each of which alone explains the asymptotic errors of an engine, if any does."""
+    """A sentence on wrong parameters and faults, each of which alone explains the asymptotic errors of an engine; empty without them."""
     parameters, faults = causes(results, engine)
     wrong = " or ".join(dict.fromkeys(map(_described, parameters)))
-    listed = ", or with ".join(filter(None, [wrong, *(f"this fault: {fault.message}" for fault in faults)]))
-    return [f"Consistent with {listed}."] if listed else []
+    listed = "; or ".join(filter(None, [wrong, *(fault.message for fault in faults)]))
+    return [f"Possible cause of the asymptotic errors: {listed}."] if listed else []
 
 
 def settings_that_explain(results: Results, engine: str) -> list[str]:
-    """A sentence for each error that changed settings of an engine explain, and for all scenes in which they are the same."""
+    """A sentence for each error that changed settings of an engine explain; scenes with the same settings share a sentence."""
     mine = results.table[(results.table["kind"] == "setting") & (results.table["engine"] == engine)].to_dict("records")
     by_scene = grouped(mine, itemgetter("scene", "metric", "dt"))
     alike = grouped(by_scene.items(), lambda item: (item[0][1], *(row["truth"] for row in item[1])))
     sentences = []
     for ((scene, metric, dt), rows), *others in alike.values():
-        also = f"; the same settings in {listed([where for (where, *_), _ in others])}" if others else ""
+        also = f"; the same settings explain it in {listed([where for (where, *_), _ in others])}" if others else ""
         error = f"of the {subject(metric, 'truth', '')} at {in_ms(dt)}"
         sentences.append(f"{scene}: {explained_by({row['truth']: row['value'] for row in rows}, error)}{also}.")
     return sentences
@@ -148,7 +148,7 @@ def _described(wrong: WrongParameter) -> str:
 
 
 def _of_one_cause(failures: Sequence[Failure]) -> str:
-    """The first of some failures in words, and the number of the others."""
+    """A sentence on failures of one cause: the first failure, and the number of the others."""
     first, *others = failures
     more = ""
     if others and first.broke_down:
@@ -196,7 +196,7 @@ def reproduce_scenes(
         results: The run.
         names: Names of the scenes.
         label: Label of the engine.
-        dts: Time steps [s]; None for all of the run.
+        dts: Time steps [s]; None for all time steps of the run.
         baseline: The baseline file to compare with.
         symmetries: Whether to test symmetries too.
     """
@@ -221,7 +221,7 @@ def reproduce_drawn(results: Results) -> list[str]:
     scenes = [*named, "--draw", str(asked["draw"]), "--seed", str(asked["seed"])]
     engines = [results.provenance["names"][label] for label in results.engines]
     command = _command(scenes, engines, sorted(asked["dts"], reverse=True), asked)
-    return [f"Scenes drawn with seed {asked['seed']}: {asked['draw']}. Reproduce: {command}"]
+    return [f"{counted(asked['draw'], 'scene was', 'scenes were')} drawn with seed {asked['seed']}. Reproduce: {command}"]
 
 
 def _command(

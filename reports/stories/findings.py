@@ -25,22 +25,22 @@ if TYPE_CHECKING:
     import pandas as pd
 
 CONVERGING = frozenset({"passed", "measured", "no_truth"})
-"""Verdicts that are no finding."""
+"""Verdicts of scenes in which no check fails and no fault is expected."""
 SAME_SIZE = 0.999
-"""Errors count as equal from this share of the largest one on."""
+"""Smallest ratio of an error to the largest one at which the two count as equal."""
 
 
 @dataclass(frozen=True, eq=False)
 class Counts:
-    """The checks of a run.
+    """The number of checks of a run by verdict, and the checks that show an expected error.
 
     Attributes:
         passed: Number of passed checks.
         failed: Number of failed checks.
         broken: Number of rows that report a breakdown of an engine.
         fixed: Number of passed checks for which a fault is expected.
-        known: The checks that show a fault, with an error that is not negligible, that the scene expects of the engine by name.
-        limited: The checks whose failure is explained by a known limitation of the engine.
+        known: The checks with a fault that the scene expects of the engine by name, and with an error that is not negligible.
+        limited: The checks whose failure a known limitation of the engine explains.
     """
 
     passed: int
@@ -66,12 +66,12 @@ def counts(results: Results) -> Counts:
 
 @dataclass(frozen=True)
 class ProfileComparison:
-    """An engine with default settings compared with the same engine, calibrated.
+    """An engine with default settings compared with the same engine with calibrated settings.
 
     Attributes:
         engine: Label of the engine with default settings.
-        calibrated: Label of the calibrated one.
-        rows: Errors of both at the finest time step; `part` is the share of the error that the calibrated engine does not have.
+        calibrated: Label of the engine with calibrated settings.
+        rows: Errors of both at the finest time step; `part` is the share of the error that calibrated settings remove.
     """
 
     engine: str
@@ -86,7 +86,7 @@ class ProfileComparison:
         are = "is mostly a setting error" if most == 1 else "are mostly setting errors"
         return (
             f"{in_sentence(self.engine)}: {most} of its {counted(len(parts), 'error')} above {SMALLEST_STATED:g} "
-            f"at the finest time step {are} (median share {100 * statistics.median(parts):.1f} %)."
+            f"at the finest time step {are} (median share of the settings in an error: {100 * statistics.median(parts):.1f} %)."
         )
 
 
@@ -109,7 +109,7 @@ def profile_comparisons(results: Results) -> list[ProfileComparison]:
 
 
 def orders(results: Results, scene: str, engine: str) -> str:
-    """The observed orders of an engine's errors in a scene, with the interval that contains the 95 % intervals of all; empty if none is."""
+    """The observed orders of an engine's errors in a scene, with an interval that contains their 95 % intervals; empty without orders."""
     table = results.table
     mine = table[(table["kind"] == "order") & (table["scene"] == scene) & (table["engine"] == engine)]
     observed = mine[(mine["cause"] == "discretisation") & mine["value"].notna()]
@@ -140,10 +140,10 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
     if results.measurements.empty:
         return "No check was made, because no scene was simulated."
     if (results.table["basis"] == "few_starts").any():
-        return "No check is decided by the few starts of a quick run."
+        return "The few starts of a quick run do not decide any check."
     set_at_all = any(scene.expect for scene in results.scenes.values())
     none = "No expectation covers these engines at these time steps" if set_at_all else "The scenes have no expectations"
-    return f"{none}; {len(results.measurements):,} values were measured."
+    return f"{none}; {counted(len(results.measurements), 'value was', 'values were')} measured."
 
 
 def _known(results: Results, tally: Counts) -> str:
@@ -160,15 +160,15 @@ def _known(results: Results, tally: Counts) -> str:
 
 
 def missing_engines(results: Results) -> list[str]:
-    """A sentence for each engine that is missing: why."""
+    """For each engine that is missing, a sentence with the reason."""
     return list(results.table.loc[results.table["verdict"] == "missing"].drop_duplicates("engine")["reason"])
 
 
 def finding_sentences(results: Results) -> list[str]:
     """One sentence for each engine that is not missing.
 
-    The sentence gives the number of scenes with each outcome, the largest error that is known or does not vanish as dt → 0, and the cost
-    of a time step.
+    The sentence gives the number of scenes with each outcome, the largest error that fails, is expected or does not vanish as dt → 0, and
+    the cost of a time step.
     """
     times, statuses, lasting = step_times(results), results.statuses(), results.asymptotic_errors("model", "setting")
     lasting = lasting[lasting["value"].abs() > SMALLEST_STATED]
@@ -186,7 +186,7 @@ def finding_sentences(results: Results) -> list[str]:
 
 
 def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], remain: Collection[str]) -> str:
-    """The number of scenes with each outcome and reason, and the largest known or remaining error."""
+    """The number of scenes with each outcome and reason, and the largest error that fails, is expected or does not vanish as dt → 0."""
     mine = results.table[results.table["engine"] == engine]
     kinds: Counter[tuple[str, str]] = Counter()
     for scene, status in sorted(statuses.items(), key=lambda item: -VERDICTS.index(item[1].verdict)):
@@ -210,18 +210,18 @@ def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], 
 
 
 def beside_recordings(results: Results) -> Iterator[str]:
-    """A sentence for each engine and recording: how far apart they are at the finest time step, with the uncertainty."""
+    """For each engine and recording, a sentence with their difference at the finest time step and its uncertainty."""
     for engine, scene in product(results.engines, results.recorded):
         of_engine, metric = results.table[results.table["engine"] == engine], leading_metric(results.scenes[scene])
         rows = of_engine[(of_engine["scene"] == scene) & (of_engine["metric"] == metric)].set_index("kind")
         finest = rows.loc[rows["dt"] == rows["dt"].min(), "value"]
         if "uncertainty" in finest:
             value = with_unit(f"{formatted(finest['truth'])} ± {formatted(finest['uncertainty'])}", METRICS[metric].unit)
-            yield f"{in_sentence(engine)}: {quantity(metric)} {value} from the recording in {scene}."
+            yield f"{in_sentence(engine)}: the {quantity(metric)} differs from the recording in {scene} by {value}."
 
 
 def _largest(results: Results, errors: "pd.DataFrame") -> str:
-    """The largest of some errors relative to their scales, with the scenes in which it has this size; empty if there are none."""
+    """The largest error relative to its scale, with the scenes in which it has this size; empty if there are no errors."""
     if errors.empty:
         return ""
     sizes = np.array(relative_sizes(errors, results.scenes))
@@ -234,7 +234,7 @@ def _largest(results: Results, errors: "pd.DataFrame") -> str:
 
 
 def _cost(engine: str, times: Mapping[str, float], compilation: float | None) -> list[str]:
-    """The time per step of an engine, its ratio to that of the fastest engine, and the time to compile a scene [s] if it compiles."""
+    """The time per step of an engine, its ratio to that of the fastest engine, and the time to compile a scene if the engine compiles."""
     timed = {label: time for label, time in times.items() if not math.isnan(time)}
     if engine not in timed:
         return []

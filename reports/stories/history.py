@@ -14,7 +14,7 @@ MOST_RESULTS = 6
 def document(history: History) -> Document:
     """The results that changed most, and the cause to which the changes in each run are attributed."""
     causes = [
-        f"{move.engine}: {counted(len(move.results), 'result')} changed in {history.names[move.run]}, after {history.names[move.before]}. "
+        f"{move.engine}: {counted(len(move.results), 'result')} changed from {history.names[move.before]} to {history.names[move.run]}. "
         f"{capitalized(move.attribution.message)}."
         for move in history.moves
     ]

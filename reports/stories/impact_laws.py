@@ -1,13 +1,13 @@
-"""How far each engine is from the exact solution under each law of impacts with friction, where the slip turns and the laws differ."""
+"""The distances of engines to the exact solutions under several laws of impacts with friction, in scenes in which these laws differ."""
 
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.stories.numbers import formatted, in_ms, quantity, unit
 from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, law_of
 
 NOTE = (
-    "Distances to the exact solution under each law of impacts with friction, in scenes where the laws differ. Engines are judged by the "
-    "law of the scene (*); the other laws are other models, and the distances to them are not errors. A law without a distance (–) has the "
-    "same impacts as that of the scene, or no solution."
+    "Distances from each engine to the exact solution under each law of impacts with friction, in scenes in which the laws differ. Engines "
+    "are judged by the law of the scene (*). The other laws are other models, and distances to their solutions are not errors. A dash (–) "
+    "means that a law gives the same impacts as the law of the scene, or has no solution."
 )
 
 

@@ -1,4 +1,4 @@
-"""The output of `dropspin limits`: the largest time steps, and for each engine the range of tested values in which it is sound."""
+"""The output of `dropspin limits`: the largest time steps, and for each engine the range of tested values in which it does not fail."""
 
 from collections.abc import Sequence
 from itertools import groupby
@@ -14,23 +14,24 @@ from dropspin.reports.stories.numbers import duration, left_out
 from dropspin.reports.stories.study import Study
 
 ACCURATE_AND_STABLE = (
-    "Accurate: sound at every smaller tested time step. Stable: errors beyond the tolerance are the only failures at these steps."
+    "Accurate: the engine is sound at this time step and at all smaller ones that were tested. Stable: at these time steps, the only "
+    "failures are errors above the tolerance."
 )
 COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterion", "size", "message")
 
 
 class Limits(Study):
-    """What `dropspin limits` found in each scene."""
+    """The results of `dropspin limits` in each scene."""
 
     study: Literal["limits"] = "limits"
     scenes: list[RobustnessStudy]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Every tested value, and a row for each engine that is missing."""
+        """A row for each tested value, and a row for each engine that is missing."""
         return [row for study in self.scenes for row in _rows(study)]
 
     def document(self) -> Document:
-        """The ranges in each scene; and the largest time steps."""
+        """The ranges in each scene, and the largest time steps at which engines are accurate and stable."""
         parts: list[Part] = []
         for study in self.scenes:
             charts = [Charts(study.scene.name, limits_charts(study))] if study.scans else []
@@ -42,7 +43,7 @@ class Limits(Study):
 
 
 def _rows(study: RobustnessStudy) -> list[dict[str, Any]]:
-    """Every tested value of every scan, the smaller time steps tried at the nominal values, and a row for each engine left out."""
+    """A row for each value of each scan and for each smaller time step tried at the nominal values, and one for each engine left out."""
     name, scanned = study.scene.name, {scan.engine for scan in study.scans if scan.axis.name == "step"}
     points = [(scan.engine, scan.axis, point) for scan in study.scans for point in scan.points]
     not_scanned = [engine for engine in study.refinements if engine not in scanned]
@@ -56,7 +57,7 @@ def nominal(study: RobustnessStudy) -> str:
     """The conditions of a study: scene, time step and tolerance. An axis may vary the time step."""
     return (
         f"{study.scene.name} at dt = {duration(study.dt)}. "
-        f"Sound: the engine does not fail, and its errors are at most {study.within:g} (ratios, and angles in rad)."
+        f"Sound: the engine meets no failure criterion, and its errors are at most {study.within:g} (ratios, or angles in rad)."
     )
 
 
@@ -91,7 +92,7 @@ def range_rows(study: RobustnessStudy) -> list[dict[str, str]]:
 
 
 def _range(scan: AxisScan, nominal: str | None) -> dict[str, str]:
-    """The range of an axis; `nominal` is the failure mode at the nominal values, if there is one, which an invariant axis repeats."""
+    """The range along an axis. `nominal` is the failure mode at the nominal values, which recurs at every value of an invariant axis."""
     points, ends = scan.points, scan.sound_range
     count, sound = len(points), sum(point.mode == "sound" for point in points)
     none = {"sound from": "–", "to": "–"}

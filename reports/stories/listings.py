@@ -1,4 +1,4 @@
-"""The output of `dropspin list`: the scenes, the engines, the metrics."""
+"""The output of `dropspin list`: the scenes, the engines or the metrics."""
 
 from dropspin.scenarios.loading import load, names
 from dropspin.scenarios.problems import problems

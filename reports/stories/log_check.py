@@ -1,4 +1,4 @@
-"""The output of `dropspin log check`: what the flights of a recording show, each value with its interval; then what is wrong with it."""
+"""The output of `dropspin log check`: the values that the flights of a recording give, with their intervals, and the findings."""
 
 import math
 from collections.abc import Sequence
@@ -19,17 +19,17 @@ from dropspin.scenarios.text import counted
 SMALL = 0.1
 """Lengths and angles below this are shown in mm and mrad [m, rad]."""
 DIGITS = 2
-"""Significant digits of the half width of an interval, to which a value is shown."""
+"""Significant digits of the half width of an interval; the value is rounded to the same decimal."""
 MOST_ALIKE = 3
-"""Findings of one kind that a terminal shows."""
+"""Largest number of findings of one kind that a terminal shows."""
 SPINNING = "tosses of 0.3 s that spin at 8 rad/s or more, about different axes"
-NEEDS = {f"centre of mass, {axis}": "about {tosses} such tosses, or faster ones" for axis in "xyz"}
+NEEDS = {f"centre of mass, {axis}": "about {tosses} tosses like these, or a faster spin" for axis in "xyz"}
 NEEDS |= {"I_x / I_y over the header's": SPINNING, "I_z / I_y over the header's": SPINNING, "drag": "longer flights"}
-"""What makes a value identifiable, by its name."""
+"""What a recording needs for a value to be identifiable, by the name of the value."""
 
 
 class CheckedLog(Study):
-    """What `dropspin log check` found."""
+    """The results of `dropspin log check`."""
 
     study: Literal["log_check"] = "log_check"
     recording: str
@@ -43,7 +43,7 @@ class CheckedLog(Study):
         return cls(recording=recording, values=list(check.values), findings=list(check.findings), tosses=list(check.tosses))
 
     def rows(self) -> list[dict[str, Any]]:
-        """Every value, every finding and every toss, each with the columns of all."""
+        """A row for each value, finding and toss; every row has the columns of all three kinds."""
         rows = [{"row": "values", **asdict(value), "note": self._note(value)} for value in self.values]
         for finding in self.findings:
             words = {"causes": [cause.name for cause in finding.causes], "remedy": remedy(finding), "sentence": sentence(finding)}
@@ -52,10 +52,10 @@ class CheckedLog(Study):
         return with_all_columns(rows)
 
     def document(self) -> Document:
-        """The values, the findings, and on a page the tosses."""
+        """The values and the findings; a page also has a chart of the flights."""
         frames = np.array([toss.frames for toss in self.tosses], dtype=float)
         flights = counted(int((frames > 0).sum()), "flight")
-        head = f"{self.recording}: {counted(len(self.tosses), 'toss', 'tosses')}, {flights} of {int(frames.sum()):,} frames in all."
+        head = f"{self.recording}: {counted(len(self.tosses), 'toss', 'tosses')}; {flights} with {int(frames.sum()):,} frames in total."
         noise = Line("toss", frames, np.array([toss.noise for toss in self.tosses]), width=0.0, marker="o")
         parts = [sentence(finding) for finding in self.findings]
         kinds = grouped(self.findings, lambda finding: finding.kind)
@@ -74,7 +74,7 @@ class CheckedLog(Study):
         )
 
     def _note(self, value: Value) -> str | None:
-        """What would make a value identifiable; None for one that is."""
+        """What the recording needs for a value to be identifiable; None if the value is identifiable."""
         if not value.half_width > value.useful:
             return None
         flights = sum(toss.frames > 0 for toss in self.tosses)
@@ -82,7 +82,7 @@ class CheckedLog(Study):
 
 
 def _row(value: Value, note: str | None) -> dict[str, str]:
-    """A value with its interval; of one that is not identifiable, what it needs."""
+    """A value with its interval, or, if it is not identifiable, what the recording needs."""
     name, small = {"quantity": value.name}, value.unit in ("m", "rad") and abs(value.value) < SMALL
     scale, unit = (1e3, f"m{value.unit}") if small else (1.0, value.unit.replace("s^1.5", "(s √s)"))
     if note is not None:
@@ -96,6 +96,7 @@ def _row(value: Value, note: str | None) -> dict[str, str]:
 
 
 def _brief(findings: Sequence[Finding]) -> list[str]:
-    """The sentences of findings of one kind, of which there may be one for each toss."""
+    """Sentences on the first findings of one kind, and the number of the others; each toss may have one."""
     more = len(findings) - MOST_ALIKE
-    return [*map(sentence, findings[:MOST_ALIKE]), *([f"And {more} more of this kind ({findings[0].kind})."] if more > 0 else [])]
+    others = [f"{counted(more, 'more finding', 'more findings')} of this kind ({findings[0].kind})."] if more > 0 else []
+    return [*map(sentence, findings[:MOST_ALIKE]), *others]

@@ -1,4 +1,4 @@
-"""The output of `dropspin log compare`: errors of engines beside measured tosses, groups without significant differences, and parts."""
+"""The output of `dropspin log compare`: errors of engines relative to measured tosses, differences between engines, parts of errors."""
 
 import math
 from collections.abc import Sequence
@@ -15,23 +15,23 @@ from dropspin.reports.stories.numbers import formatted, grouped, left_out
 from dropspin.reports.stories.study import Study, with_all_columns
 
 UNITS = {"1": (100.0, " [%]"), "rad": (180.0 / math.pi, " [°]"), "s": (1.0, " [s]")}
-"""The factor with which values of a unit are shown, and the unit in which they are."""
+"""By unit of a value, the factor that converts it to the unit that is shown, and this unit."""
 OF = {"position": UNITS["1"], "orientation": UNITS["rad"]}
-"""The same for the quantities of differences and parts."""
+"""The factor and the shown unit of the quantities in the tables of differences and of parts."""
 LEGEND = (
-    "Means over {tosses} tosses with 95 % intervals; in brackets the noise floor, due to the errors of the measured start. Positions are "
-    "in percent of {length:.4g} mm, the largest extent of the body, and energies in percent of that at the start."
+    "Means over {tosses} tosses with 95 % intervals. In brackets: the noise floor, which errors of the measured initial state cause. "
+    "Positions are in percent of {length:.4g} mm, the largest extent of the body; energies are in percent of the initial energy."
 )
 IMPROVED = (
-    "Each part is the decrease of the error after one more improvement: the centre of mass that the flights show, fitted friction and "
-    "restitution, half of the time step. Then follow the noise floor and the rest, which is due to the model of contact. A negative part "
-    "is an increase."
+    "The first parts are decreases of the error by improvements that are made one after another: the centre of mass that the flights show, "
+    "friction and restitution that were fitted (with --fit), half of the time step. Start: the noise floor. Remaining: the rest of the "
+    "error, which is due to the model of contact. A negative part is an increase."
 )
 AT = {"impact": "at impact", "+0.1 s": "0.1 s later", "mean": "mean over the motion", "end": "at the end"}
 
 
 class ComparedLog(Study):
-    """What `dropspin log compare` found."""
+    """The results of `dropspin log compare`."""
 
     study: Literal["log_compare"] = "log_compare"
     recording: str
@@ -39,7 +39,7 @@ class ComparedLog(Study):
     comparison: LogComparison
 
     def rows(self) -> list[dict[str, Any]]:
-        """Every error, difference, group and part, and a row for each engine left out."""
+        """A row for each error, difference, group, part and engine left out."""
         study = self.comparison
         rows = [{"row": part, **asdict(row)} for part in ("errors", "pairs", "parts") for row in getattr(study, part)]
         rows += [{"row": "groups", "quantity": quantity, "engines": group} for quantity, groups in study.groups.items() for group in groups]
@@ -106,7 +106,7 @@ def _cell(error: Error) -> str:
 
 
 def interval(value: float, lower: float, upper: float) -> str:
-    """A value and its interval; without one, the value alone."""
+    """A value with its interval; the value alone if it has no interval."""
     return formatted(value) if math.isnan(lower) else f"{formatted(value)}, {formatted(lower)} to {formatted(upper)}"
 
 
@@ -121,15 +121,15 @@ def _pair_row(pair: Pair) -> dict[str, str]:
 
 
 def _group_sentences(study: LogComparison) -> list[str]:
-    """The groups by quantity, and what they mean."""
+    """A sentence on the groups for each quantity, and the meaning of the groups."""
     sentences = [
         f"In {quantity}, these engines do not differ significantly: {'; '.join(' and '.join(group) for group in groups if len(group) > 1)}."
         for quantity, groups in study.groups.items()
         if any(len(group) > 1 for group in groups)
     ]
     meaning = (
-        "The intervals of the differences hold for all pairs together. A group of engines has no order; an engine is in two groups if it "
-        "differs from members of neither."
+        "The 95 % intervals of the differences hold for all pairs simultaneously. Engines of one group are not ranked. An engine is in two "
+        "groups if it does not differ significantly from any engine of either group."
     )
     return [*sentences, meaning] if study.pairs else []
 

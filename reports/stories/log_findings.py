@@ -1,4 +1,4 @@
-"""Sentences on what is wrong with a recording: what was found, the causes, what shows or separates them, and the remedy."""
+"""Sentences on the findings of a recording: the error, its possible causes, how to distinguish the causes, and the remedy."""
 
 import math
 from collections.abc import Iterable
@@ -8,23 +8,23 @@ from dropspin.comparisons.logs.log import Cause, Finding
 from dropspin.reports.stories.numbers import capitalized
 
 KINDS = {
-    "up": "bodies fall along another axis than the header says",
+    "up": "the body does not fall opposite to the upward axis of the header",
     "unit": "gravity is {value:.4g} m/s² instead of {expected:.4g}",
     "scale": "gravity is {value:.4g} m/s² instead of {expected:.4g}",
-    "tilt": "gravity is {degrees:.2g}° from the upward axis",
-    "centre of mass": "the tracked point turns about a point {mm:.2g} mm from the centre of mass given",
-    "inertia, x": "I_x / I_y is {value:.3g} times that of the header",
-    "inertia, z": "I_z / I_y is {value:.3g} times that of the header",
-    "drag": "the speed decays at {value:.2g} 1/s",
-    "quaternion": "the quaternions are in another order or of the inverse rotation",
-    "spin": "the recorded spin differs by {percent:.0f} % from that of the quaternions",
-    "no flight": "toss {toss}: no free flight of {expected:.0f} frames",
-    "frame dropped": "toss {toss}: {value:.0f} missing before frame {frame}",
-    "late": "toss {toss}: its flight begins at frame {frame}",
-    "repeated": "toss {toss}, frame {frame}: rows that repeat the one before while the body moves: {value:.0f}",
-    "gap": "toss {toss}, frame {frame}: frames that are missing before it, by the times: {value:.0f}",
-    "jitter": "toss {toss}, frame {frame}: the times are uneven: a step of {ms:.4g} ms, the usual one is {expected_ms:.4g} ms",
-    "rate": "the times have {value:.5g} frames per second, the header has {expected:.5g}",
+    "tilt": "the measured gravity is tilted by {degrees:.2g}° from the vertical axis of the header",
+    "centre of mass": "the body turns about a point {mm:.2g} mm from the centre of mass in the header",
+    "inertia, x": "I_x / I_y is {value:.3g} times the ratio in the header",
+    "inertia, z": "I_z / I_y is {value:.3g} times the ratio in the header",
+    "drag": "the speed decays at a rate of {value:.2g} 1/s",
+    "quaternion": "the quaternions have another order than the header says, or describe the inverse rotation",
+    "spin": "the recorded angular velocity differs by {percent:.0f} % from that of the quaternions",
+    "no flight": "toss {toss}: no free flight of at least {expected:.0f} frames",
+    "frame dropped": "toss {toss}: number of frames missing before frame {frame}: {value:.0f}",
+    "late": "toss {toss}: the free flight begins only at frame {frame}",
+    "repeated": "toss {toss}, frame {frame}: number of rows that repeat the previous row while the body moves: {value:.0f}",
+    "gap": "toss {toss}, frame {frame}: number of frames missing before it, according to the times: {value:.0f}",
+    "jitter": "toss {toss}, frame {frame}: the times are uneven: a step takes {ms:.4g} ms, the usual step {expected_ms:.4g} ms",
+    "rate": "the times have {value:.5g} frames per second, the header says {expected:.5g}",
 }
 CAUSES = {
     "length unit": "lengths are in {key}",
@@ -34,57 +34,57 @@ CAUSES = {
     "centre of mass": "the centre of mass is at {key} m",
     "tracked point": "the tracked point is at {key} m",
     "axes": "the axes are tilted",
-    "push": "something pushes sideways",
+    "push": "a horizontal force acts on the body",
     "spin frame": "it is in the {key} frame",
     "degrees": "it is in degrees per second",
-    "sign of the spin": "its sign is the opposite one",
-    "held": "it is held until then",
-    "earlier impact": "the recording begins after an impact",
+    "sign of the spin": "its sign is reversed",
+    "held": "the body is held until then",
+    "earlier impact": "the flight follows an impact",
     "times": "the column t is wrong",
     "rate of the header": "the key rate is wrong",
 }
-"""The words for causes; one that only has keys needs none."""
+"""The words for causes; a cause without words is stated by the keys of its remedy."""
 LESS_OR_MORE = {
     "length scale": ("lengths are {percent:.1f} % short", "lengths are {percent:.1f} % long"),
     "rate": ("the rate is {percent:.1f} % low", "the rate is {percent:.1f} % high"),
 }
-"""The same for shares of up to a half."""
+"""The words for lengths and rates that are wrong by at most a half, too small and too large."""
 REMEDIES = {
-    "drag": "engines have no air; shorter falls or a denser body make its effect small",
-    "no flight": "record from the release on",
+    "drag": "engines simulate no air; shorter falls or a denser body reduce the effect of drag",
+    "no flight": "begin the recording when the body is released",
     "frame dropped": "give the times in a column t",
     "repeated": "leave out rows that were not measured",
     "jitter": "give the exact time of each frame; or, if the frames are evenly spaced, leave out the column t and give rate in the header",
     "rate": "multiply the times t by {ratio:.4g}",
-    "axes": "turn the axes by a level tag on the floor",
-    "push": "film without wind and strings",
+    "axes": "align the axes with a tag that lies level on the floor",
+    "push": "film without wind and without strings on the body",
     "degrees": "multiply wx, wy, wz by π/180",
     "sign of the spin": "change the sign of wx, wy, wz",
     "held": "leave out the rows before frame {frame}",
-    "earlier impact": "record from the release on",
-    "times": "no column t",
+    "earlier impact": "begin the recording when the body is released",
+    "times": "leave out the column t",
 }
-"""What removes a finding or a cause without keys."""
+"""The remedies of findings, and of causes that no key of the header removes."""
 SHOWN_BY = {
-    "scale": "heights at rest are {rests:.4g} of the expected ones",
+    "scale": "heights at rest are {rests:.4g} times the expected ones",
     "centre of mass": "heights at rest on opposite faces differ by {rests_mm:.2g} mm",
-    "quaternion": "{percent:.0f} % of the tosses rest on a face as given, {expected_percent:.0f} % so",
+    "quaternion": "{percent:.0f} % of the tosses end at rest on a face as recorded, {expected_percent:.0f} % with the remedy",
 }
 SEPARATED_BY = {
-    "unit": "the height at rest on a known face, or a length in the record",
-    "scale": "a resting height on a known face, or the rate of the camera by a clock in the picture",
-    "centre of mass": "heights at rest on opposite faces",
+    "unit": "measure the height at rest on a known face, or a length in the recording",
+    "scale": "measure the height at rest on a known face, or the rate of the camera with a clock in the picture",
+    "centre of mass": "measure the heights at rest on opposite faces",
 }
 
 
 def sentence(finding: Finding) -> str:
-    """What was found, its causes, what shows or separates them, and the remedy."""
+    """The error, its possible causes, the evidence for them or how to distinguish them, and the remedy."""
     values, several = _values(finding), len(finding.causes) > 1
     is_shown = math.isfinite(finding.value if finding.kind == "quaternion" else finding.rests)
     by = SEPARATED_BY if several else SHOWN_BY if is_shown else {}
     parts = {
         ": either " if several else ": ": ", or ".join(filter(None, map(_words, finding.causes))),
-        ". Separated by: " if several else ". Shown by: ": by.get(finding.kind, "").format_map(values),
+        ". To distinguish: " if several else ". Evidence: ": by.get(finding.kind, "").format_map(values),
         ". Remedy: ": remedy(finding),
     }
     rest = "".join(name + text for name, text in parts.items() if text)
@@ -111,7 +111,7 @@ def corrections(recording: str, findings: Iterable[Finding]) -> list[str]:
     sentences = [sentence(finding) for finding in findings if any(cause.keys for cause in finding.causes)]
     if sentences:
         sentences.append(
-            f"Correct the header first: dropspin log check {recording} writes corrected.toml, with each remedy that has no alternative."
+            f"Correct the header first: dropspin log check {recording} writes corrected.toml, with each remedy that is the only one."
         )
     return sentences
 
@@ -126,7 +126,7 @@ def _words(cause: Cause) -> str:
 
 
 def _remedy(cause: Cause, values: dict[str, Any]) -> str:
-    """The keys of the header that remove a cause, or what else does."""
+    """The keys of the header that remove a cause, or a remedy in words."""
     if not cause.keys:
         return REMEDIES.get(cause.name, "").format_map(values | {"ratio": 1.0 + cause.share})
     names = {key: f"[body] {key.removeprefix('body.')}" if key.startswith("body.") else key for key in cause.keys}

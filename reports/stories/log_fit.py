@@ -15,7 +15,7 @@ from dropspin.reports.stories.study import Study, with_all_columns
 TRANSFERS: Mapping[str, Mapping[str, str]] = {
     "restitution": {
         "equal": "Restitution transfers between {first} and {second}",
-        "undecided": "The tosses do not show that restitution transfers between {first} and {second}: use the value of each with it alone",
+        "undecided": "The tosses do not show that restitution transfers between {first} and {second}: use each value only with its engine",
         "different": "Restitution does not transfer between {first} and {second}: it is a setting of the engine, not of the body",
     },
     "friction": {
@@ -25,13 +25,13 @@ TRANSFERS: Mapping[str, Mapping[str, str]] = {
     },
 }
 NOT_IDENTIFIED: Mapping[str, str] = {
-    "friction": "no toss slides, or the engine does not use it; tosses that strike the floor at a flat angle would bound it",
-    "restitution": "the motions do not depend on it, or the engine does not use it",
+    "friction": "no toss slides, or the engine does not use friction; tosses that strike the floor at a flat angle would bound it",
+    "restitution": "the motions do not depend on restitution, or the engine does not use it",
 }
 
 
 class FittedLog(Study):
-    """What `dropspin log fit` found."""
+    """The results of `dropspin log fit`."""
 
     study: Literal["log_fit"] = "log_fit"
     recording: str
@@ -39,7 +39,7 @@ class FittedLog(Study):
     fit: LogFit
 
     def rows(self) -> list[dict[str, Any]]:
-        """Every estimate, every difference between two engines, and a row for each engine left out."""
+        """A row for each estimate, for each difference between two engines, and for each engine left out."""
         fit, estimates = self.fit, [*self.fit.estimates, *([self.fit.friction] if self.fit.friction else [])]
         rows = [{"row": "estimates", **asdict(row), "discrepancy": fit.discrepancies.get(row.engine)} for row in estimates]
         rows += [{"row": "transfers", **asdict(row)} for row in fit.transfers]
@@ -58,7 +58,9 @@ class FittedLog(Study):
             "discrepancy is the difference from the recorded positions that neither noise nor errors of the initial states explain."
         )
         if fit.friction:
-            legend += " The interval of an engine holds for it alone; that in the row of any engine includes the differences between them."
+            legend += (
+                " The interval of an engine holds for this engine only; the interval of 'any engine' includes differences between them."
+            )
         unknown = [
             f"{row.parameter.capitalize()} is not identified with {row.engine}: {NOT_IDENTIFIED[row.parameter]}."
             for row in fit.estimates
@@ -87,9 +89,9 @@ def interval(estimate: Estimate) -> str:
 
 
 def transfer(pair: Transfer) -> str:
-    """Whether the value of a parameter with one engine is that with another."""
+    """A sentence on whether the fitted value of a parameter is the same for two engines."""
     statement = TRANSFERS[pair.parameter][pair.verdict].format(first=pair.first, second=pair.second)
     return (
         f"{statement}. {pair.first} needs {abs(pair.difference):.3f} {'more' if pair.difference > 0.0 else 'less'} (95 % interval of "
-        f"the difference {pair.lower:.3f} to {pair.upper:.3f}; equal is up to {EQUAL})."
+        f"the difference: {pair.lower:.3f} to {pair.upper:.3f}; differences of up to {EQUAL} count as equal)."
     )

@@ -1,4 +1,4 @@
-"""The output of `dropspin show part.stl`: what a mesh is as a body."""
+"""The output of `dropspin show part.stl`: the properties of a mesh as a rigid body."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ def mesh_rows(file: str) -> list[dict[str, str]]:
     """The size, the mass properties, the hull and the defects of a mesh, as a solid, or as a surface if it is not closed.
 
     Raises:
-        DropspinError: The file is not a mesh, or a mesh that no body has.
+        DropspinError: The file is not a mesh, or no body can have this mesh.
     """
     points, faces = read_mesh(Path(file), file)
     closed = is_closed(points, faces)
@@ -47,7 +47,7 @@ def mesh_rows(file: str) -> list[dict[str, str]]:
     else:
         facts["hull"] = f"{counted(len(hull.vertices), 'corner')}, {hull.volume:g} m³"
         if closed and abs(body.content) < (1.0 - CONVEX) * hull.volume:
-            facts["convex"] = "no: a floor sees the hull"
+            facts["convex"] = "no: the convex hull touches the floor instead"
     if extents.max() > IN_MILLIMETRES:
         facts["remark"] = f"{extents.max():g} m is large: if the file is in millimetres, give scale = 0.001"
     return [{"what": key, "is": value} for key, value in facts.items()]

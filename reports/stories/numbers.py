@@ -11,9 +11,9 @@ from dropspin.comparisons.measuring.symmetries import kind_of
 from dropspin.scenarios.text import counted, rounded
 
 MOST_NAMED = 3
-"""Scenes, metrics or engines that a sentence names; of more it has the number."""
+"""Largest number of scenes, metrics or engines that a sentence names; if there are more, it gives their number."""
 SEVERAL = 1.02
-"""Sum of shares above which they belong to alternative explanations."""
+"""Sum of shares above which the shares belong to alternative explanations."""
 Item = TypeVar("Item")
 Key = TypeVar("Key")
 
@@ -40,7 +40,7 @@ def bound(lower: float, upper: float) -> str:
 
 
 def word(verdict: str) -> str:
-    """A verdict in words: the reason of its outcome, or the outcome; `not measured`, of a record, stays."""
+    """A verdict in words: the reason of its outcome, or the outcome; other words, such as `not measured` of a record, are not changed."""
     outcome, reason = OUTCOMES.get(verdict, (verdict, ""))
     return reason or outcome
 
@@ -51,7 +51,7 @@ def outcome(verdict: str) -> str:
 
 
 def quantity(metric: str) -> str:
-    """The quantity of which a metric is the error, in words; for a metric that is no error, its name."""
+    """The quantity whose error a metric is, in words; for a metric that is not an error, its name in words."""
     return metric.replace("_", " ").removesuffix(" error")
 
 
@@ -113,7 +113,7 @@ def left_out(reasons: Mapping[str, str]) -> list[str]:
 
 
 def explained_by(shares: Mapping[str, float], error: str) -> str:
-    """The settings that explain an error, with their shares of it; two by one name, such as `a, b`, that do so only together."""
+    """The settings that explain an error, with their shares of it; a name such as `a, b` is two settings that explain it only together."""
     names, sizes = [name.replace(", ", " and ") for name in shares], [f"{rounded(100.0 * share, 3)} %" for share in shares.values()]
     are_together = any(", " in name for name in shares)
     explain = "explain" if are_together else "explains"
@@ -176,4 +176,4 @@ def trend(asymptotic_error: float, cause: str, order: str = "") -> str:
     if cause == "discretisation":
         return order or "→ 0"
     value = f"→ {formatted(asymptotic_error)}"
-    return {"model": value, "setting": f"{value}, a setting", COMBINED: f"{value}: {COMBINED}"}.get(cause, cause)
+    return {"model": value, "setting": f"{value}: setting error", COMBINED: f"{value}: {COMBINED}"}.get(cause, cause)

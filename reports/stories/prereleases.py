@@ -1,4 +1,4 @@
-"""What changed in prereleases of engines: a note with a command for each engine that shows it."""
+"""A note on what changed in prereleases of engines, with a command for each engine that shows the changes."""
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
@@ -23,15 +23,15 @@ def prereleases(measured: Mapping[str, Sequence[Release]]) -> Note:
     changed = {engine: sentences for engine, releases in compared.items() if (sentences := _sentences(engine, releases))}
     parts = [part for engine, sentences in changed.items() for part in _of_engine(engine, compared[engine], sentences)]
     alike = [f"{engine}: no result changed from {_names(compared[engine])}." for engine in compared if engine not in changed]
-    missing = [f"No prerelease after the newest release: {', '.join(engine for engine in measured if engine not in compared)}."]
-    title = f"{counted(len(changed), 'engine')} of {len(compared)} with a prerelease changed"
+    missing = [f"Without a prerelease after the newest release: {', '.join(engine for engine in measured if engine not in compared)}."]
+    title = f"Changes in {len(changed)} of {counted(len(compared), 'engine')} with a prerelease"
     return Note(Document(title, [*parts, Sentences(alike + (missing if len(compared) < len(measured) else []))]), bool(changed))
 
 
 def _of_engine(engine: str, releases: Sequence[Release], sentences: Sequence[str]) -> list[Part]:
     chosen = " ".join(f"--release {release.name}" for release in releases)
     heading = Heading(f"{engine}, from {_names(releases)}", on_terminal=True)
-    return [heading, Sentences(sentences), Paragraph("To show it:", f"dropspin record --pre -e {engine} {chosen}")]
+    return [heading, Sentences(sentences), Paragraph("To show the changes:", f"dropspin record --pre -e {engine} {chosen}")]
 
 
 def _sentences(engine: str, releases: Sequence[Release]) -> list[str]:

@@ -1,4 +1,4 @@
-"""The pages of a record in words: the digits in a cell, what changed in a release, and what an engine gets right and wrong."""
+"""The texts on the pages of a record: the digits in a cell, the changes in a release, and the scenes that an engine gets right or wrong."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -15,11 +15,11 @@ from dropspin.reports.stories.matrix import level
 from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, with_unit, word
 
 GROUPS = {"at least 5 digits": 5.0, "at least 2, less than 5 digits": 2.0, "less than 2 digits": 0.0}
-"""What an engine gets right and wrong: errors below 1e-5 of the scale do not matter to any use of an engine."""
+"""The groups of scenes that an engine gets right and wrong, with the least digits of each; smaller errors than 1e-5 do not matter."""
 
 
 class Cell(NamedTuple):
-    """A cell of a matrix: its text, the decade of the error for its colour, the status, and what it shows when pointed at."""
+    """A cell of a matrix: its text, the decade of the error for its colour, the status, and the tooltip."""
 
     text: str
     level: int | None
@@ -38,7 +38,7 @@ def cell(release: Release, label: str, scene: str, dt: float) -> Cell:
         status = "too coarse" if case.verdict == "measured" else word(case.verdict)
         return Cell(MARKS[case.verdict], None, status, remark + again)
     parts = [f"{metric.replace('_', ' ')} {with_unit(formatted(case.values[metric]), METRICS[metric].unit)}"]
-    parts += [f"over starts {sizes(case)}"] if sizes(case) else []
+    parts += [f"{sizes(case)} over initial states"] if sizes(case) else []
     parts += [f"{cost(case)} per simulated second, {case.relative_cost:.3g} times that of Wang's method"] if cost(case) != "–" else []
     shown = ", ".join(parts) + ", "
     status, mark = ("limited", "! ") if case.reason else ("measured", "")
@@ -56,12 +56,12 @@ def cost(case: Case) -> str:
 
 
 def sizes(case: Case) -> str:
-    """The range of the size of the leading error over starts; empty for a scene with one."""
+    """The range of the size of the leading error over initial states; empty for a scene with one initial state."""
     return "" if math.isnan(case.low) else f"{formatted(case.low)} to {formatted(case.high)}"
 
 
 def error(case: Case, scene: str) -> str:
-    """The leading error from the scene's own start, or why there is none."""
+    """The leading error from the initial state of the scene, or the verdict if there is no error."""
     return word(case.verdict) if case.verdict != "measured" else formatted(case.values.get(leading(scene), math.nan))
 
 
@@ -73,7 +73,7 @@ def mean_cost(release: Release, label: str, dt: float, *, with_floor: bool) -> s
 
 
 def remarks(cases: Mapping[str, Case]) -> list[str]:
-    """Why there is no result, or which limitation is known: a sentence for all names, of scenes or labels, that have the same."""
+    """The reasons why there is no result, and known limitations: a sentence for all scenes, or all engines, with the same reason."""
     alike = grouped([name for name, case in cases.items() if case.reason], lambda name: (cases[name].verdict, cases[name].reason))
     words = {verdict: "limited" if verdict == "measured" else word(verdict) for verdict, _ in alike}
     return [f"{', '.join(names)}: {words[verdict]}: {reason}" for (verdict, reason), names in alike.items()]
@@ -82,7 +82,7 @@ def remarks(cases: Mapping[str, Case]) -> list[str]:
 def change_sentences(changed: Sequence[Change]) -> dict[str, list[str]]:
     """What changed in each release, newest first: a sentence for each scene, the largest change of digits first.
 
-    Labels and scenes that changed alike have one sentence; scenes with values in one of the releases only come last.
+    Engines and scenes that changed alike share a sentence; scenes with a value in only one of the two releases come last.
     """
     shown = [_shown(changes) for changes in grouped(changed, lambda change: (change.release, change.label, change.scene)).values()]
     ordered = sorted(shown, key=lambda change: -_gained(change))
@@ -120,7 +120,7 @@ def _words(change: Change) -> str:
 
 
 def summary(release: Release, label: str, dt: float) -> list[str]:
-    """What an engine gets right and wrong in a release: sentences."""
+    """Sentences on the scenes that an engine gets right and wrong in a release."""
     cases = release.at(label, dt)
 
     def group(scene: str) -> str:
@@ -133,7 +133,7 @@ def summary(release: Release, label: str, dt: float) -> list[str]:
 
 
 def changes_in_words(changed: Sequence[Change]) -> str:
-    """The releases in which results changed, and the others in which scenes gained or lost their results."""
+    """The releases in which results changed, and the other releases in which scenes gained or lost their results."""
     numbers = list(dict.fromkeys(change.release for change in changed if change.metric))
     others = [release for release in dict.fromkeys(change.release for change in changed) if release not in numbers]
     parts = [f"results changed in {', '.join(numbers)}" if numbers else "no result changed"]

@@ -1,4 +1,4 @@
-"""The output of `dropspin reproduce`: published values beside those found here, source by source."""
+"""The output of `dropspin reproduce`: for each source, the published values beside the values that were computed here."""
 
 import math
 from collections import Counter
@@ -24,18 +24,18 @@ LEGEND = (
 
 
 class Reproduction(Study):
-    """What `dropspin reproduce` found, and the sources."""
+    """The results of `dropspin reproduce`, and the sources."""
 
     study: Literal["reproduce"] = "reproduce"
     sources: list[Source]
     results: list[Result]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Every result."""
+        """A row for each result."""
         return list(map(asdict, self.results))
 
     def document(self) -> Document:
-        """The results of each source, and how many of all are reproduced."""
+        """The results of each source, and the number of all results that are reproduced."""
         parts: list[Part] = []
         for source in self.sources:
             results = [result for result in self.results if result.source == source.name]
@@ -48,7 +48,7 @@ class Reproduction(Study):
 
 
 def _table(results: Sequence[Result]) -> list[dict[str, str]]:
-    """The results of one source: a row for each tool and what gave its values here, and below it one for each value."""
+    """The results of one source: a row for each tool with what computes its values here, followed by a row for each value."""
     rows = []
     for (tool, by), group in groupby(results, key=lambda result: (result.tool, result.by)):
         rows.append((f"{tool}: {by}" if by else tool, "", "", ""))
@@ -64,7 +64,7 @@ def _difference(result: Result) -> str:
 
 
 def _notes(source: Source, results: Sequence[Result]) -> list[str]:
-    """Why engines give the values of a source, why others cannot, and the remarks on the source."""
+    """The reasons for the choice of engines, the reasons why values are not reproduced, and the remarks on the source."""
     reasons = [(group.tool, group.by, group.why) for group in source.groups if group.why]
     reasons += [(row.tool, row.by, f"{row.status}: {row.reason.removesuffix('.')}") for row in results if row.reason]
     return [*(f"{tool}, {by}: {why}." if by else f"{tool}: {why}." for tool, by, why in dict.fromkeys(reasons)), *source.remarks]
@@ -80,7 +80,7 @@ def _summary(results: Sequence[Result]) -> list[dict[str, str]]:
 
 
 def _verdict(results: Sequence[Result]) -> str:
-    """Whether everything that is claimed to be reproducible is."""
+    """A sentence with the number of values that are reproduced, that differ, and that were not run."""
     counts = Counter(row.status for row in results)
     claimed = counts["reproduced"] + counts["differs"]
     not_run = f"; {counted(counts['not run'], 'was', 'were')} not run" if counts["not run"] else ""

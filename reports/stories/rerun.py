@@ -1,4 +1,4 @@
-"""The output of `dropspin record rerun`: a row for each time step, and what is not as in the record."""
+"""The output of `dropspin record rerun`: a row for each time step, and the differences from the record."""
 
 import math
 from typing import Any
@@ -19,11 +19,11 @@ def document(again: Again, scene: str) -> Document:
         {"dt": in_ms(dt), f"{error}, recorded": _value(was, metric), "now": _value(now, metric), "motion": _motion(was, now)}
         for dt, (was, now) in again.cases.items()
     ]
-    return Document(f"{scene} again", [Table(rows), Sentences(_sentences(again))])
+    return Document(f"{scene}, measured again", [Table(rows), Sentences(_sentences(again))])
 
 
 def _value(case: Case, metric: str) -> str:
-    """All digits of a value, or why there is none."""
+    """A value with all digits, or the verdict if there is no value."""
     return word(case.verdict) if case.verdict != "measured" else repr(case.values.get(metric, math.nan))
 
 
@@ -34,13 +34,13 @@ def _motion(was: Case, now: Case) -> str:
 
 
 def _sentences(again: Again) -> list[str]:
-    """Why there is no motion, whether the record was reproduced, and what is not as in the record."""
+    """Sentences: why there is no motion, whether the record was reproduced, and what differs from the record."""
     reasons = []
     for was, now in again.cases.values():
         if was.verdict != "measured" and was.reason != now.reason:
-            reasons.append(f"In the record {word(was.verdict)}: {was.reason}.")
+            reasons.append(f"In the record, {word(was.verdict)}: {was.reason}.")
         if now.verdict != "measured":
-            reasons.append(f"{word(now.verdict).capitalize()}: {now.reason or 'the plan no longer has this time step'}.")
+            reasons.append(f"{word(now.verdict).capitalize()}: {now.reason or 'the plan of the record no longer has this time step'}.")
     moved, count = len(again.moved), len(again.cases)
     differ = f"{moved} of {counted(count, 'result')} {'differs' if moved == 1 else 'differ'} from the record."
     result = differ if moved else "Every result equals that of the record, bit for bit."
@@ -50,7 +50,7 @@ def _sentences(again: Again) -> list[str]:
 
 
 def as_data(again: Again) -> dict[str, Any]:
-    """Everything with all digits, for JSON."""
+    """The results with all digits, for JSON."""
     cases = [{"dt": dt, "same": dt not in again.moved, "recorded": _case(was), "now": _case(now)} for dt, (was, now) in again.cases.items()]
     return {"cases": cases, "differing": {name: {"recorded": was, "now": now} for name, (was, now) in again.differing.items()}}
 

@@ -39,7 +39,7 @@ class Overview:
         statuses: The status of each engine in each scene, by scene and engine.
         profiles: Engines with default settings compared with the calibrated ones.
         failures: The failures, grouped.
-        tags: The scenes with each property with which the conclusion excepts scenes.
+        tags: By property, such as Coulomb friction, the scenes that have it; the conclusion excepts scenes by these properties.
         laws: The distances of engines to other impact laws, in scenes in which the laws differ: the rows of `law_rows`.
     """
 
@@ -84,7 +84,7 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = (), e
         results: The run.
         summary: Its overview.
         tables: What a terminal shows first.
-        explained: What a terminal shows of the failures: `unexpected_failures`, whose search for causes a page does not need.
+        explained: The failures as a terminal shows them, from `unexpected_failures`; a page does not need the search for their causes.
     """
     statuses = [
         {"scene": scene, **{engine: f"{status.mark} {status.words}" for engine, status in by_engine.items()}}
@@ -113,7 +113,7 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = (), e
 
 
 def unexpected_failures(results: Results, summary: Overview) -> list[Part]:
-    """The failures of a run that no baseline accepts, with what explains them, for a terminal."""
+    """The failures of a run without those of accepted results, with what explains them, for a terminal."""
     unexpected = [failure for failure in summary.failures if not failure.accepted]
     return [replace(part, on_page=False) for part in failure_parts(results, unexpected)]
 
@@ -123,7 +123,7 @@ def _quick(results: Results) -> list[str]:
     if not results.is_quick:
         return []
     undecided = int((results.table["basis"] == "few_starts").sum())
-    decided = f"{counted(undecided, 'check is', 'checks are')} not decided by so few starts. " if undecided else ""
+    decided = f"So few starts do not decide {counted(undecided, 'check')}. " if undecided else ""
     return [
         f"Quick run: {QUICK_START_PHASES} start phases instead of {START_PHASES}, at most {QUICK_MEMBERS} members of an ensemble, and no "
         f"perturbed starts in double precision. {decided}Run again without --quick to compare or accept the results."

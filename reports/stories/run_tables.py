@@ -1,4 +1,4 @@
-"""Every metric of every engine: for each scene a table with a column for each engine, and what is below it."""
+"""The tables of `dropspin run --verbose`: for each scene every metric, with a column for each engine, and sentences below the table."""
 
 from collections.abc import Iterator
 

@@ -28,7 +28,7 @@ def modelled(scene: Scenario) -> list[str]:
         linear, angular = scene.damping.factors.values()
         parts[-1] += f", by factors of {linear:g} and {angular:g} per step of {scene.damping.factor_dt:g} s"
     if scene.ensemble is not None:
-        parts.append(f"{counted(scene.ensemble.size, 'start')} drawn around the scene's own")
+        parts.append(f"{counted(scene.ensemble.size, 'start')} drawn around that of the scene")
     if scene.recording is not None:
         parts.append(counted(len(scene.recording.tosses), "measured toss", "measured tosses"))
     return parts

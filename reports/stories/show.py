@@ -53,7 +53,7 @@ def scene_rows(scene: Scenario) -> Rows:
 
 
 def _other_laws(truth: Truth, others: Mapping[Law, Truth]) -> str:
-    """By how much the velocity after the first impact differs under the other laws of impacts with friction."""
+    """The differences of the velocity after the first impact under the other laws of impacts with friction."""
     after = truth.events[0].after[VELOCITY]
     changes = [f"{law} {np.linalg.norm(other.events[0].after[VELOCITY] - after):.2g} m/s" for law, other in others.items() if other.events]
     return f"velocity after the first impact differs by: {', '.join(changes)}; these are other models, not errors"
@@ -118,7 +118,7 @@ def _built(entry: "EngineEntry", scene: Scenario, dt: float) -> Rows:
 
 
 def _setting_rows(engine: "Engine", settings: Mapping[str, Any], calibrated: Mapping[str, Any]) -> Rows:
-    """The settings in force, each with its source, and with its calibrated value if that is another one."""
+    """The settings in force, each with its source, and with its calibrated value if it differs."""
     acting = {name: setting for name, setting in engine.settings.items() if not setting.is_computed and engine.unmet_need(name) is None}
     defaults = {name: setting.default for name, setting in acting.items()}
     reasons = engine.reasons if engine.is_calibrated else {}

@@ -1,4 +1,4 @@
-"""A study as `section.json` keeps it: what was found, with all digits, and no sentence."""
+"""The base class of studies, as `section.json` stores them: the results with all digits, without sentences."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -11,10 +11,10 @@ from dropspin.reports.document import Document
 
 
 class Study(BaseModel):
-    """What a study found. Numbers may be infinite or NaN.
+    """The results of a study. Numbers may be infinite or NaN.
 
     Attributes:
-        study: The command, after which the files are named.
+        study: The name of the command; the files are named after it.
     """
 
     model_config = ConfigDict(extra="forbid", ser_json_inf_nan="strings")
@@ -23,15 +23,15 @@ class Study(BaseModel):
 
     @abstractmethod
     def rows(self) -> list[dict[str, Any]]:
-        """The tables as CSV and JSON; numbers that are not defined are NaN or None."""
+        """The rows of the CSV and JSON tables; undefined numbers are NaN or None."""
 
     @abstractmethod
     def document(self) -> Document:
-        """The page, which is also a section of a report and the output on a terminal."""
+        """The document that becomes the page, a section of a report, or the output on a terminal."""
 
 
 def with_all_columns(rows: Sequence[Mapping[str, Any]], left_out: Mapping[str, str] = MappingProxyType({})) -> list[dict[str, Any]]:
-    """Rows of several kinds, each with the columns of all; and one for each engine that is left out, with the reason."""
+    """Rows of several kinds, each with the columns of all kinds, and a row with the reason for each engine that is left out."""
     every = [*rows, *({"row": "left out", "engine": engine, "reason": why} for engine, why in left_out.items())]
     columns = dict.fromkeys(name for row in every for name in row)
     return [{name: row.get(name) for name in columns} for row in every]

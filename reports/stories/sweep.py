@@ -14,7 +14,7 @@ WORST_OF = {metric: f"worst_{metric}" for metric in ("energy_drift", "energy_gai
 
 
 def rows(where: str) -> list[dict[str, Any]]:
-    """A row for each engine: its jobs, their verdicts, the largest magnitudes of some metrics, or None, and their total time [s].
+    """A row for each engine: its jobs, their verdicts, the largest magnitudes of some metrics (None if undefined), and their time [s].
 
     The table is read part by part, because it may be larger than memory.
     """
@@ -33,7 +33,7 @@ def rows(where: str) -> list[dict[str, Any]]:
 
 
 def document(table: Sequence[Mapping[str, Any]]) -> Document:
-    """The rows."""
+    """A table of the rows."""
     columns = {name.replace("_", " "): name for name in WORST_OF.values()}
     shown = [
         {

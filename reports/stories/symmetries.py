@@ -11,6 +11,7 @@ from dropspin.reports.document import Document, Paragraph, Sentences, Table
 from dropspin.reports.stories.matrix import level
 from dropspin.reports.stories.numbers import grouped
 from dropspin.reports.stories.study import Study
+from dropspin.scenarios.text import counted
 
 COLUMNS = ("scene", "engine", "symmetry", "status", "difference", "step", "time", "reason")
 MEANINGS: dict[Status, str] = {
@@ -24,13 +25,13 @@ MEANINGS: dict[Status, str] = {
 
 
 class Symmetries(Study):
-    """What `dropspin symmetries` found."""
+    """The results of `dropspin symmetries`."""
 
     study: Literal["symmetries"] = "symmetries"
     findings: list[Finding]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Every finding, with all digits."""
+        """A row for each finding, with all digits."""
         return [{name: getattr(finding, name) for name in COLUMNS} for finding in self.findings]
 
     def document(self) -> Document:
@@ -70,7 +71,10 @@ def worst_lost(findings: Sequence[Finding]) -> list[Finding]:
 def legend(findings: Sequence[Finding]) -> str:
     """The meaning of the numbers, and of each mark that occurs."""
     marks = ", ".join(MEANINGS[status] for status in STATUSES if any(finding.status == status for finding in findings))
-    return f"Each number is the largest difference of two motions of any scene, in radians or relative to sizes and speeds. {marks}."
+    return (
+        "Each number is the largest difference between two motions that should be equal, over all scenes, in radians or relative to sizes "
+        f"and speeds. {marks}."
+    )
 
 
 def sentences(findings: Sequence[Finding]) -> list[str]:
@@ -84,14 +88,14 @@ def sentences(findings: Sequence[Finding]) -> list[str]:
 
 def _broken(findings: Sequence[Finding]) -> str:
     worst, others = findings[0], findings[1:]
-    more = f"; in {len(others)} other scene{'s' if len(others) > 1 else ''} too" if others else ""
-    since = f"from step {worst.step} on (t = {worst.time:.4g} s)"
+    more = f"; they also differ in {counted(len(others), 'other scene')}" if others else ""
+    since = f"from step {worst.step} onwards (t = {worst.time:.4g} s)"
     size = f"{worst.difference:.2g}" if math.isfinite(worst.difference) else "infinite"
-    return f"{worst.engine}, {worst.symmetry}: another motion in {worst.scene}, {since}; the largest difference is {size}{more}."
+    return f"{worst.engine}, {worst.symmetry}: in {worst.scene}, the two motions differ {since}; the largest difference is {size}{more}."
 
 
 def _not_run(findings: Sequence[Finding]) -> list[str]:
-    """The engines, symmetries and scenes that were not run, by reason."""
+    """Sentences on the engines, symmetries and scenes that were not run, by reason."""
     groups = grouped((finding for finding in findings if finding.status == "not run"), attrgetter("engine", "reason"))
     sentences = []
     for (engine, reason), group in sorted(groups.items(), key=itemgetter(0)):

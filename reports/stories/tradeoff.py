@@ -16,18 +16,18 @@ from dropspin.reports.stories.study import Study
 from dropspin.scenarios.text import counted, rounded
 
 BUSY = 0.5
-"""Other threads per processor from which on a machine counts as busy: on one with two processors, one other thread."""
+"""Number of other running threads per processor from which a machine counts as busy: one thread on two processors."""
 
 
 class TradeOffs(Study):
-    """What `dropspin tradeoff` found in each scene, and the tolerances that were asked for."""
+    """The results of `dropspin tradeoff` in each scene, and the tolerances that were given."""
 
     study: Literal["tradeoff"] = "tradeoff"
     scenes: list[TradeOff]
     within: list[float]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Every engine and time step tried."""
+        """A row for each engine and time step tried."""
         return [row for study in self.scenes for row in rows(study)]
 
     def document(self) -> Document:
@@ -47,8 +47,8 @@ def _per_world(worlds: int) -> str:
 def rows(study: TradeOff) -> list[dict[str, Any]]:
     """A row for every engine and time step tried, and a row without a time step for each engine that was not run.
 
-    A row has the error, the median, minimum, quartiles and spread over the rounds of the wall time per simulated second [s], and the reason
-    why the engine's ladder ended. Where the rounds do not decide whether a configuration is on the Pareto front, that is None.
+    A row has the error; the median, minimum, quartiles and spread, over the rounds, of the wall time per simulated second [s]; and the
+    reason why no smaller time step was tried. `on_pareto_front` is None if the rounds do not decide it.
     """
     points = {(point.engine, point.dt): point for point in study.points}
     front, undecided = ([(point.engine, point.dt) for point in points] for points in (study.pareto_front, study.undecided))
@@ -114,7 +114,7 @@ def sentences(study: TradeOff, within: Sequence[float]) -> list[str]:
         *(_recommendation(study, tolerance) for tolerance in within),
         *_timings(study),
         *([f"Memory per world in a batch of {study.worlds[-1]}: {memory}."] if memory else []),
-        *(f"No smaller time step was tried because {reason}: {engines}." for reason, engines in ends.items()),
+        *(f"No smaller time steps than these were tried, because {reason}: {engines}." for reason, engines in ends.items()),
         *left_out(study.left_out),
     ]
 
@@ -127,27 +127,26 @@ def _recommendation(study: TradeOff, tolerance: float) -> str:
     if advice is None:
         nearest = min(study.points, key=lambda point: point.error)
         ladder = next(ladder for ladder in study.ladders if ladder.engine == nearest.engine)
-        last, error = ladder.steps[-1][0], f"{formatted(nearest.error)}{unit}"
-        ended = f"its ladder of time steps ended at {in_ms(last)}"
+        error = f"{formatted(nearest.error)}{unit}"
         if nearest.error <= tolerance:
-            none = "no configuration is within it at its time step and at all smaller ones"
-            outcome = f"{none}; {_named(nearest)} has {error}, but more at smaller time steps; {ended}"
+            none = "no tested configuration is within it at its time step and at all smaller ones"
+            outcome = f"{none}; {_named(nearest)} has an error of {error}, but a larger one at a smaller time step"
         else:
-            where = "where its ladder of time steps ended" if nearest.dt == last else f"and {ended}"
-            outcome = f"no tested configuration reaches it; the most accurate is {_named(nearest)} with {error}, {where}"
-        return f"{goal}: {outcome} because {_reason(ladder)}."
+            outcome = f"no tested configuration reaches it; the most accurate is {_named(nearest)} with an error of {error}"
+        tried = f"With this engine, no time step below {in_ms(ladder.steps[-1][0])} was tried"
+        return f"{goal}: {outcome}. {tried}, because {_reason(ladder)}."
     sentence, ratio = f"{goal}: {_named(advice.best)}, {duration(advice.best.typical_cost)} per simulated second", advice.ratio
     if advice.next_best is None:
-        sentence += "; no other engine reaches it." if len(study.ladders) > 1 else "."
+        sentence += "; no other engine reaches this tolerance." if len(study.ladders) > 1 else "."
     elif not advice.level:
-        sentence += f"; the next best, {_named(advice.next_best)}, takes {ratio:.1f} times that."
+        sentence += f"; the next best, {_named(advice.next_best)}, takes {ratio:.1f} times as long."
     else:
-        less = f"{ratio:.1f} times that, but less in a quarter of the rounds"
-        sentence += f"; {_named(advice.next_best)} takes {less if ratio >= LEVEL else f'about as long, {ratio:.2f} times that'}."
+        less = f"{ratio:.1f} times as long, but less time in a quarter of the rounds"
+        sentence += f"; {_named(advice.next_best)} takes {less if ratio >= LEVEL else f'about as long ({ratio:.2f} times)'}."
     for size in study.worlds:
         if batched := study.best_in_batch(tolerance, size):
             cost = duration(batched.costs_per_world[size])
-            sentence += f" In a batch of {size}, {_named(batched)}: {cost} per world and simulated second."
+            sentence += f" In a batch of {size}, the cheapest is {_named(batched)}: {cost} per world and simulated second."
     return sentence
 
 
@@ -158,13 +157,13 @@ def _timings(study: TradeOff) -> list[str]:
     if undecided:
         are = counted(len(undecided), "configuration is", "configurations are")
         those = ", ".join(map(_named, undecided))
-        listed.append(f"{are} on the Pareto front in some of the rounds only, so that the timings do not decide it: {those}.")
+        listed.append(f"{are} on the Pareto front in only some of the rounds, so the timings are not decisive: {those}.")
     if study.spread >= LEVEL:
-        listed.append(f"Timings vary: the median of the rounds is typically {study.spread:.2g} times the least (column cost_spread).")
+        listed.append(f"Timings vary: the median over the rounds is typically {study.spread:.2g} times the shortest (column cost_spread).")
     batches = [(value, size, point) for point in study.points for size, value in point.spreads_per_world.items() if value >= LEVEL]
     if batches:
         value, size, point = max(batches, key=lambda batch: batch[0])
-        listed.append(f"Timings of batches vary by a factor of up to {value:.2g}, that of {_named(point)} in a batch of {size}.")
+        listed.append(f"Timings of batches vary by a factor of up to {value:.2g}, for {_named(point)} in a batch of {size}.")
     if study.load >= BUSY:
         listed.append(
             f"The machine was busy while costs were measured: {study.load:.1f} other threads per processor were running, on average; "

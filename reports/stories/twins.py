@@ -7,14 +7,14 @@ from dropspin.comparisons.symmetries.twins import LEVELS, TwinFinding
 from dropspin.reports.document import Document, Sentences, Table
 
 LEGEND = (
-    "A step is the first after which the motions differ at all, or by more than the size in the heading, in radians or relative to sizes "
-    "and speeds; step 0 is the start. Rounding explains a difference if the initial state perturbed by 16 eps changes the motion of one "
-    "of the two engines as much."
+    "The columns of steps have the first step after which the motions differ at all, or by more than the size in the heading; step 0 is "
+    "the initial state. Differences are in radians, or relative to sizes and speeds. Rounding explains a difference if the motion of one "
+    "of the two engines changes as much when the initial state is perturbed by 16 eps (machine epsilon)."
 )
 
 
 def document(findings: Sequence[TwinFinding]) -> Document:
-    """A row for each finding, what the columns mean, and each reason not to run."""
+    """A row for each finding, the meaning of the columns, and the reasons why pairs of engines were not run."""
     reasons = [
         f"Not run: {finding.engine} and {finding.twin} in {finding.scene}: {finding.reason}."
         for finding in findings

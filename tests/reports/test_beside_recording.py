@@ -41,7 +41,7 @@ def test_terminal_shows_the_uncertainty(results, capsys):
     print_table(results)
     text = capsys.readouterr().out
     assert re.search(r"uncertainty of the recording, position error: mujoco \S+ m, wang\[", text)
-    assert re.search(r"MuJoCo: position \S+ ± \S+ m from the recording in one-toss\.", text)
+    assert re.search(r"MuJoCo: the position differs from the recording in one-toss by \S+ ± \S+ m\.", text)
     assert "exact" not in text
 
 

@@ -35,13 +35,13 @@ def test_ball_by_the_law_of_the_exact_solution_passes():
         (
             pyramid,
             "slippery floor",
-            "the impulse of friction over that of the normal force is 0.17 instead of 0.12 (41 % too high); "
+            "the ratio of the friction impulse to the normal impulse is 0.17 instead of 0.12 (41 % too high); "
             "friction acts 14° from its exact direction; position is off by ",
         ),
         (
             lambda *impact: coulomb(*impact, factor=0.9),
             "slippery floor",
-            "the impulse of friction over that of the normal force is 0.108 instead of 0.12 (10 % too low); position is off by ",
+            "the ratio of the friction impulse to the normal impulse is 0.108 instead of 0.12 (10 % too low); position is off by ",
         ),
         (with_restitution(lambda e, speed: min(1.0, 1.01 * e)), "bouncing ball", "restitution is 0.606 instead of 0.6 (1 % too high); pos"),
         (with_restitution(lambda e, speed: e / (1.0 + 0.1 * speed)), "lively ball", "restitution is 0.83 instead of 1 (17 % too low); pos"),
@@ -135,7 +135,7 @@ def test_height_of_the_first_contact_is_stated_only_if_it_is_wrong():
         (
             "friction on balls doubled in the first impact",
             "slippery floor",
-            "the impulse of friction over that of the normal force is 0.24 instead of",
+            "the ratio of the friction impulse to the normal impulse is 0.24 instead of",
         ),
         (
             "friction pyramid instead of the friction cone in impacts of balls",

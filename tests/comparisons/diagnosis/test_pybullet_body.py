@@ -138,7 +138,7 @@ def test_restitution_is_the_product_with_that_of_the_plane(tmp_path):
     assert ball.facts.restitution == 0.0
     [(name, setting, made)] = ball.facts.ignored
     assert (name, str(setting)) == ("restitution", '<restitution value="0.5"> (model.urdf, line 2)')
-    assert made == "is 0, the product with 0 of plane.urdf"
+    assert made == "0, the product with the restitution 0 of plane.urdf"
     assert ball.changed({"restitution": 1.0}).facts.ignored == []
     answers = impact(ball, DTS[:1])
     assert named(answers, REBOUND, 3.0).measured == 0.0
@@ -219,7 +219,7 @@ def test_what_pybullet_does_not_use_is_named(tmp_path):
     assert odd.facts.friction == 0.5
     assert {name: made for name, _, made in odd.facts.ignored if name != "inertia"} == {
         "lateral_friction": "not read, because it is not within <contact>",
-        "inertial of b": "1 kg",
+        "inertial of b": "missing: the mass is 1 kg",
         "joint": "replaced by a fixed joint",
     }
 

@@ -32,7 +32,7 @@ def test_history_finds_the_run_in_which_results_moved(repository, tmp_path):
     """The run, what the move is attributed to, a table and a plot for each scene."""
     done = dropspin("compare", "history", "out", "-o", tmp_path / "history", cwd=repository)
     assert done.returncode == 0, done.stderr
-    assert "changed in failing, after good. Attributed to the engine" in " ".join(done.stdout.split())
+    assert "changed from good to failing. Attributed to the engine" in " ".join(done.stdout.split())
     names = {path.name for path in (tmp_path / "history").iterdir()}
     assert names == {"history.csv", "history.json", "history.md", "drop-ball.svg", "spin-principal.svg"}
     rows = json.loads((tmp_path / "history/history.json").read_text())

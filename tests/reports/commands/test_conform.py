@@ -88,7 +88,7 @@ def test_exceptions_have_the_line_of_the_adapter_and_are_printed_once(raising):
     assert [row[:20].strip() for row in rows] == list(CHECKS)
     [first] = [row for row in rows if row.endswith(ERROR)]
     same = [row for row in rows if row.endswith(f"  the same error as in '{first[:20].strip()}'")]
-    assert shared == f"{1 + len(same)} checks have one error: {ERROR}"
+    assert shared == f"{1 + len(same)} checks have the same error: {ERROR}"
     [built] = [row for row in rows if row.startswith("builds what is meant")]
     assert f"{ERROR}, in the scene tumbling; decline scenes that the engine cannot run, with a reason" in built
     assert outcome == f"{2 + len(same)} of {len(rows)} checks fail, with 2 different messages."

@@ -49,7 +49,7 @@ def test_sound_recording_has_values_and_no_finding(recording):
     lines = done.stdout.splitlines()
     assert len(lines) <= 40
     assert max(map(len, lines)) <= 80
-    assert lines[0].startswith("toss.toml: 10 tosses, 10 flights of ")
+    assert lines[0].startswith("toss.toml: 10 tosses; 10 flights with ")
     assert lines[-2:] == ["0 findings.", "Written: out/log-check/report.html"]
     folder = recording / "out/log-check"
     rows = json.loads((folder / "log_check.json").read_text())
@@ -63,7 +63,7 @@ def test_sound_recording_has_values_and_no_finding(recording):
 def test_finding_is_printed_with_alternatives_and_remedy_and_is_exit_code_1(recording):
     done = dropspin("log", "check", "short.toml", "-o", "out", cwd=recording)
     assert done.returncode == 1
-    said = r"Gravity is .* m/s² .*: either lengths are (.*) % short, or the rate is (.*) % low\. Separated by: .* Remedy: length_scale = "
+    said = r"Gravity is .* m/s² .*: either lengths are (.*) % short, or the rate is (.*) % low\. To distinguish: .* Remedy: length_scale = "
     found = re.search(said, done.stdout)
     assert found is not None, done.stdout
     assert [float(number) for number in found.groups()] == pytest.approx([2.0, 1.0], abs=0.3)
@@ -124,7 +124,7 @@ def test_many_findings_of_one_kind_are_shortened_on_a_terminal_alone():
     study = CheckedLog(recording="r", values=[], findings=findings, tosses=[])
     texts = [list(part.items) for part in study.document().parts if part.kind == "sentences"]
     assert [len(items) for items in texts] == [5, 4]
-    assert texts[1][-1] == "And 2 more of this kind (gap)."
+    assert texts[1][-1] == "2 more findings of this kind (gap)."
 
 
 def test_help_of_log_lists_its_commands(tmp_path):
@@ -138,7 +138,7 @@ def test_help_of_log_lists_its_commands(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("log", "chek"), "No such command 'chek'. Did you mean 'check'? To list what it takes: dropspin log --help"),
+        (("log", "chek"), "No such command 'chek'. Did you mean 'check'? To list the arguments and options: dropspin log --help"),
         (("log", "check", "toss-cub"), "recording 'toss-cub' is unknown. Did you mean 'toss-cube'?"),
         (("log", "check", "toss.npz"), "toss.npz: is the data of a recording; give its header"),
         (("log", "check", "absent.toml"), "absent.toml: No such file or directory"),

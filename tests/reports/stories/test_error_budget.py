@@ -51,7 +51,7 @@ def budget(results):
         (made(8e-3, asymptotic=(1e-5, -1e-4, 1e-4, "discretisation"), order=3.9, spread=2.5), "Discretisation error."),
         (
             made(8e-3, asymptotic=(1e-5, -1e-4, 2e-2, "discretisation"), order=4.0),
-            "Discretisation error down to 0.0200; the time steps do not resolve smaller ones.",
+            "Attributed to discretisation, although the time steps bound the asymptotic error only by 0.0200.",
         ),
         (
             made(4e-2, asymptotic=(3e-2, 2.9e-2, 3.1e-2, "model"), order=1.0),
@@ -59,7 +59,7 @@ def budget(results):
         ),
         (
             made(0.8, asymptotic=(0.9, 0.89, 0.91, "setting")),
-            "0.900 is a setting error: the calibrated profile has none or a smaller one; the remaining -0.100 is discretisation error.",
+            "0.900 is a setting error, which calibrated settings reduce or remove; the remaining -0.100 is discretisation error.",
         ),
         (made(4e-2, asymptotic=(4.05e-2, 3.9e-2, 4.2e-2, "model")), "A model error, which no time step removes."),
         (
@@ -71,7 +71,7 @@ def budget(results):
             "0.0300 is a model error, which no time step removes; the remaining 0.0100 is discretisation error. "
             "Known limitation: the time steps leave it open.",
         ),
-        (made(4e-2, asymptotic=(4e-2, -1e-2, 5e-2, "rounding")), "Within rounding."),
+        (made(4e-2, asymptotic=(4e-2, -1e-2, 5e-2, "rounding")), "Within rounding error."),
         (made(4e-2, asymptotic=(4e-2, -1e-2, 5e-2, "unresolved")), "Undecided: the time steps leave it open."),
         (made(4e-2), "Undecided: too few usable time steps."),
         (made(1.0, unit="rad"), "Undecided: too few usable time steps."),

@@ -16,14 +16,14 @@ RATE = Cause("rate", -0.0111, {"rate": 149.7})
     [
         (
             Finding("scale", 9.594, 9.81, causes=(LENGTH,), rests=0.9785),
-            "Gravity is 9.594 m/s² instead of 9.81: lengths are 2.2 % short. Shown by: heights at rest are 0.9785 of the expected ones. "
-            "Remedy: length_scale = 0.978.",
+            "Gravity is 9.594 m/s² instead of 9.81: lengths are 2.2 % short. Evidence: heights at rest are 0.9785 times the expected "
+            "ones. Remedy: length_scale = 0.978.",
         ),
         (
             Finding("scale", 9.594, 9.81, causes=(LENGTH, Cause("rate", -0.0111))),
-            "Gravity is 9.594 m/s² instead of 9.81: either lengths are 2.2 % short, or the rate is 1.1 % low. Separated by: a resting "
-            "height on a known face, or the rate of the camera by a clock in the picture. Remedy: length_scale = 0.978, or multiply the "
-            "times t by 0.9889.",
+            "Gravity is 9.594 m/s² instead of 9.81: either lengths are 2.2 % short, or the rate is 1.1 % low. To distinguish: measure "
+            "the height at rest on a known face, or the rate of the camera with a clock in the picture. Remedy: length_scale = 0.978, or "
+            "multiply the times t by 0.9889.",
         ),
         (
             Finding("unit", 386.2, 9.81, causes=(Cause("length unit", keys={"length_unit": "inch"}),)),
@@ -32,25 +32,26 @@ RATE = Cause("rate", -0.0111, {"rate": 149.7})
         (
             Finding("unit", 39.2, 9.81, causes=(Cause("length scale", 3.0, {"length_scale": 4.0}), Cause("rate", 1.0, {"rate": 74.0}))),
             "Gravity is 39.2 m/s² instead of 9.81: either lengths are 4 times the true ones, or the rate is 2 times the true one. "
-            "Separated by: the height at rest on a known face, or a length in the record. Remedy: length_scale = 4, or rate = 74.",
+            "To distinguish: measure the height at rest on a known face, or a length in the recording. Remedy: length_scale = 4, or rate "
+            "= 74.",
         ),
         (
             Finding("quaternion", 0.43, 1.0, causes=(Cause("reading of the quaternions", keys={"quaternion": "wxyz"}),)),
-            "The quaternions are in another order or of the inverse rotation. Shown by: 43 % of the tosses rest on a face as given, 100 % "
-            'so. Remedy: quaternion = "wxyz".',
+            "The quaternions have another order than the header says, or describe the inverse rotation. Evidence: 43 % of the tosses end "
+            'at rest on a face as recorded, 100 % with the remedy. Remedy: quaternion = "wxyz".',
         ),
         (
             Finding("centre of mass", 0.0062, 0.0, causes=(Cause("centre of mass", keys={"body.center_of_mass": [0.0, 0.0, 0.0062]}),)),
-            "The tracked point turns about a point 6.2 mm from the centre of mass given: the centre of mass is at [0, 0, 0.0062] m. "
+            "The body turns about a point 6.2 mm from the centre of mass in the header: the centre of mass is at [0, 0, 0.0062] m. "
             "Remedy: [body] center_of_mass = [0, 0, 0.0062].",
         ),
         (
             Finding("late", 5.0, 0.0, "46", 5, (Cause("held"), Cause("earlier impact"))),
-            "Toss 46: its flight begins at frame 5: either it is held until then, or the recording begins after an impact. Remedy: leave "
-            "out the rows before frame 5, or record from the release on.",
+            "Toss 46: the free flight begins only at frame 5: either the body is held until then, or the flight follows an impact. Remedy: "
+            "leave out the rows before frame 5, or begin the recording when the body is released.",
         ),
-        (Finding("gap", 2.0, 0.0, "{1}", 20), "Toss {1}, frame 20: frames that are missing before it, by the times: 2."),
-        (Finding("tilt", math.radians(2.0), 0.0), "Gravity is 2° from the upward axis."),
+        (Finding("gap", 2.0, 0.0, "{1}", 20), "Toss {1}, frame 20: number of frames missing before it, according to the times: 2."),
+        (Finding("tilt", math.radians(2.0), 0.0), "The measured gravity is tilted by 2° from the vertical axis of the header."),
     ],
 )
 def test_sentence_of_a_finding(finding, expected):

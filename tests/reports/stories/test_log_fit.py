@@ -36,13 +36,13 @@ def test_restitution_that_differs_is_a_setting_and_unidentified_friction_is_expl
     assert isinstance(sentences, Sentences)
     text = " ".join(sentences.items)
     assert "Restitution does not transfer between mujoco and wang: it is a setting of the engine, not of the body." in text
-    assert "mujoco needs 0.158 less (95 % interval of the difference -0.195 to -0.133" in text
+    assert "mujoco needs 0.158 less (95 % interval of the difference: -0.195 to -0.133" in text
     assert "Friction transfers between mujoco and wang." in text
-    assert "The tosses do not show that restitution transfers between mujoco and bullet: use the value of each with it alone." in text
+    assert "The tosses do not show that restitution transfers between mujoco and bullet: use each value only with its engine." in text
     assert "Friction is not identified with mujoco: no toss slides" in text
     assert "broken, out of order" in text
     [correct] = document.summary
     assert isinstance(correct, Sentences)
     assert correct.items[0].endswith("Remedy: length_scale = 0.978.")
-    remedies = "writes corrected.toml, with each remedy that has no alternative."
+    remedies = "writes corrected.toml, with each remedy that is the only one."
     assert correct.items[1:] == [f"Correct the header first: dropspin log check r.toml {remedies}"]

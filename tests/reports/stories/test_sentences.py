@@ -70,17 +70,20 @@ def modelled(**tables):
     ("sentence", "expected"),
     [
         (conformance(PASSED), "The check does not fail."),
-        (conformance(PASSED, DECLINED), "None of 2 checks fails; 1 tested nothing, for the reasons given."),
+        (conformance(PASSED, DECLINED), "None of 2 checks fails; 1 tested nothing, for the reason given."),
+        (conformance(PASSED, DECLINED, DECLINED), "None of 3 checks fails; 2 tested nothing, for the reasons given."),
+        (conformance(DECLINED), "The check does not fail; it tested nothing, for the reason given."),
         (conformance(FAILED), "1 of 1 check fails."),
         (conformance(PASSED, FAILED, CRASHED), "2 of 3 checks fail."),
-        (conformance(FAILED, FAILED, CRASHED), "2 checks have one error: wrong 3 of 3 checks fail, with 2 different messages."),
-        (comparison("same"), "None of 1 result is worse."),
+        (conformance(FAILED, FAILED, CRASHED), "2 checks have the same error: wrong 3 of 3 checks fail, with 2 different messages."),
+        (comparison("same"), "The result is not worse."),
+        (comparison("same", "same"), "None of 2 results is worse."),
         (comparison("worse", "same"), "1 of 2 results is worse, moved or gone."),
         (comparison("worse", "gone"), "2 of 2 results are worse, moved or gone."),
-        (comparison("better", attributions={"a": Attribution("engine", "x")}), "a: 1 better. X. None of 1 result is worse."),
+        (comparison("better", attributions={"a": Attribution("engine", "x")}), "a: 1 better. X. The result is not worse."),
         (
             comparison(speed=[SpeedChange("a", "b", 1.5, 0.9, math.inf, 1)]),
-            "Speed (reported, not gated): a relative to b takes 1.50 times as long as before (median of 1 case, 95 % interval unbounded "
+            "Speed (reported, not gated): relative to b, a takes 1.50 times as long as before (median of 1 case, 95 % interval unbounded "
             "with so few cases). None of 0 results is worse.",
         ),
         (
@@ -105,9 +108,12 @@ def modelled(**tables):
         (published("for comparison"), "0 of 0 values are reproduced; 0 differ."),
         (published("reproduced"), "1 of 1 value is reproduced; 0 differ."),
         (published("reproduced", "reproduced", "differs", "not run"), "2 of 3 values are reproduced; 1 differs; 1 was not run."),
-        (lost("s")[0], "a, mirrored: another motion in s, from step 3 on (t = 0.003 s); the largest difference is 0.25."),
-        (lost("s", "t")[0].rpartition("largest ")[2], "difference is 0.25; in 1 other scene too."),
-        (lost("s", "t", "u", difference=math.inf)[0].rpartition("largest ")[2], "difference is infinite; in 2 other scenes too."),
+        (lost("s")[0], "a, mirrored: in s, the two motions differ from step 3 onwards (t = 0.003 s); the largest difference is 0.25."),
+        (lost("s", "t")[0].rpartition("largest ")[2], "difference is 0.25; they also differ in 1 other scene."),
+        (
+            lost("s", "t", "u", difference=math.inf)[0].rpartition("largest ")[2],
+            "difference is infinite; they also differ in 2 other scenes.",
+        ),
         (unchanged("Mon", "Tue"), "No result changed in 2 runs of 1 scene."),
         (modelled(body=SPHERE), "a sphere of 1 kg"),
         (modelled(body=ELLIPSOID, gravity={"acceleration": [0.0, -9.8, 0.0]}), "an ellipsoid of 2 kg, gravity of 9.8 m/s²"),

@@ -43,30 +43,31 @@ def test_nearest_configuration_has_the_reason_why_no_smaller_step_was_tried(foun
     [sentence, *_] = tradeoff.sentences(found, [1e-3])
     assert sentence == (
         "spin-asymmetric, orientation error within 0.001 rad: no tested configuration reaches it; the most accurate is accurate at 10 ms "
-        "with 4.00e-03 rad, where its ladder of time steps ended because a run would be too long."
+        "with an error of 4.00e-03 rad. With this engine, no time step below 10 ms was tried, because a run would be too long."
     )
     budgeted = TradeOff(found.scene, found.metric, found.points[:2], found.ladders[:1])
     assert tradeoff.sentences(budgeted, [1e-3])[0].endswith(
-        "the most accurate is mujoco[integrator=implicitfast] at 10 ms with 5.20e-03 rad, "
-        f"where its ladder of time steps ended because {SPENT} (option --budget)."
+        "the most accurate is mujoco[integrator=implicitfast] at 10 ms with an error of 5.20e-03 rad. "
+        f"With this engine, no time step below 10 ms was tried, because {SPENT} (option --budget)."
     )
     earlier = Ladder("accurate", (*found.ladders[2].steps, (0.005, 5e-3)), "error_stopped_falling", "it stays")
     stays = TradeOff(found.scene, found.metric, found.points, (*found.ladders[:2], earlier))
     sentence = tradeoff.sentences(stays, [1e-3])[0]
-    assert "at 10 ms with 4.00e-03 rad, and its ladder of time steps ended at 5 ms because it stays." in sentence
+    assert "at 10 ms with an error of 4.00e-03 rad. With this engine, no time step below 5 ms was tried, because it stays." in sentence
 
 
 def test_ladders_are_listed_with_their_ends_and_reasons(found):
     assert tradeoff.sentences(found, [])[:3] == [
-        f"No smaller time step was tried because {SPENT} (option --budget): mujoco[integrator=implicitfast] at 10 ms, other at 33 ms.",
-        "No smaller time step was tried because it stays: wang[rotation=implicit-gyroscopic] at 5 ms.",
-        "No smaller time step was tried because a run would be too long: accurate at 10 ms.",
+        f"No smaller time steps than these were tried, because {SPENT} (option --budget): "
+        "mujoco[integrator=implicitfast] at 10 ms, other at 33 ms.",
+        "No smaller time steps than these were tried, because it stays: wang[rotation=implicit-gyroscopic] at 5 ms.",
+        "No smaller time steps than these were tried, because a run would be too long: accurate at 10 ms.",
     ]
     assert tradeoff.sentences(found, [])[3:] == ["Left out: other, no convergence observed.", "Left out: missing, not installed."]
 
 
 def test_only_engine_within_a_tolerance_is_compared_with_tested_ones(found):
-    assert "; no other engine reaches it." in tradeoff.sentences(found, [4.5e-3])[0]
+    assert "; no other engine reaches this tolerance." in tradeoff.sentences(found, [4.5e-3])[0]
     alone = TradeOff(found.scene, found.metric, found.points[-2:], found.ladders[2:3])
     assert ": accurate at 10 ms, 100 µs per simulated second. In a batch" in tradeoff.sentences(alone, [4.5e-3])[0]
 
@@ -76,7 +77,8 @@ def test_error_that_is_small_at_a_coarse_step_alone_is_no_recommendation(found):
     crossing = Ladder("accurate", ((0.033, 5e-4), (0.01, 3e-3)), "budget", SPENT)
     points = tuple(CostPoint("accurate", dt, error, np.full(3, 1e-6 / dt), {}) for dt, error in crossing.steps)
     [sentence] = tradeoff.sentences(TradeOff(found.scene, found.metric, points, (crossing,)), [1e-3])[:1]
-    assert "no configuration is within it at its time step and at all smaller ones; accurate at 33 ms has 5.00e-04 rad" in sentence
+    none = "no tested configuration is within it at its time step and at all smaller ones"
+    assert f"{none}; accurate at 33 ms has an error of 5.00e-04 rad, but a larger one at a smaller time step." in sentence
 
 
 def test_slower_engine_that_is_faster_in_some_rounds_is_said_to_be(found):
@@ -84,7 +86,7 @@ def test_slower_engine_that_is_faster_in_some_rounds_is_said_to_be(found):
     ladders = tuple(Ladder(engine, ((0.01, 1e-3),), "budget", SPENT) for engine in rounds)
     points = tuple(CostPoint(engine, 0.01, 1e-3, cost, {}) for engine, cost in rounds.items())
     sentence = tradeoff.sentences(TradeOff(found.scene, found.metric, points, ladders), [1e-2])[0]
-    assert sentence.endswith("; other at 10 ms takes 2.0 times that, but less in a quarter of the rounds.")
+    assert sentence.endswith("; other at 10 ms takes 2.0 times as long, but less time in a quarter of the rounds.")
 
 
 def test_timings_that_decide_no_front_and_a_busy_machine_are_said(found):
@@ -95,10 +97,10 @@ def test_timings_that_decide_no_front_and_a_busy_machine_are_said(found):
     disturbed = TradeOff(found.scene, found.metric, points, ladders, load=2.5)
     listed = tradeoff.sentences(disturbed, [1e-2])
     assert listed[1:5] == [
-        "2 configurations are on the Pareto front in some of the rounds only, so that the timings do not decide it: "
+        "2 configurations are on the Pareto front in only some of the rounds, so the timings are not decisive: "
         "accurate at 10 ms, other at 10 ms.",
-        "Timings vary: the median of the rounds is typically 2 times the least (column cost_spread).",
-        "Timings of batches vary by a factor of up to 2.5, that of accurate at 10 ms in a batch of 256.",
+        "Timings vary: the median over the rounds is typically 2 times the shortest (column cost_spread).",
+        "Timings of batches vary by a factor of up to 2.5, for accurate at 10 ms in a batch of 256.",
         "The machine was busy while costs were measured: 2.5 other threads per processor were running, on average; "
         "measure again on an idle machine.",
     ]

@@ -120,7 +120,7 @@ def _steps(answer: Answer) -> str:
 def _exceptions(answer: Answer) -> str:
     """The scenes in which an engine is not within the tolerance, or not known to be."""
     count, rest = f"{len(answer.beyond) - len(answer.named)} scenes", answer.named
-    covered = _in_brackets(count, "" if rest else _size(answer, names_worst=True))
+    covered = _in_brackets(count, "" if rest else _size(answer))
     parts = [f"with {answer.condition}{covered}"] if answer.condition else []
     parts += [f"in {named(rest, 'scene')}{_in_brackets(_size(answer, names_worst=len(rest) > MOST_NAMED))}"] if rest else []
     except_ = f", except {' and '.join(parts)}" if parts else ""
@@ -135,7 +135,9 @@ def _in_brackets(*texts: str) -> str:
 def _absent(answer: Answer) -> str:
     """The number of scenes in which an engine has no result."""
     count = answer.scenes - len(answer.within) - len(answer.beyond) - len(answer.undecided)
-    return f", no result in {counted(count, 'scene')}{' (declined)' if count == answer.declined else ''}" if count else ""
+    if not count:
+        return ""
+    return f", {counted(count, 'scene')} declined" if count == answer.declined else f", no result in {counted(count, 'scene')}"
 
 
 def _cost(results: Results) -> list[str]:
@@ -151,4 +153,4 @@ def _undecided(results: Results) -> list[str]:
     statuses = results.statuses().items()
     marked = {engine: [scene for scene, by_engine in statuses if by_engine[engine].reason == UNDECIDED] for engine in results.engines}
     parts = [f"{in_sentence(engine)} in {named(scenes, 'scene')}" for engine, scenes in marked.items() if scenes]
-    return [f"Passed, but undecided whether each error vanishes as dt → 0 (~): {'; '.join(parts)}."] if parts else []
+    return [f"Trend as dt → 0 undecided (~): {'; '.join(parts)}."] if parts else []

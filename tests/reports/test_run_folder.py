@@ -194,7 +194,7 @@ def test_a_run_of_the_earlier_format_is_read(tmp_path):
     (old / "run.json").write_text(signed(content | {"format": 5}), encoding="utf-8")
     again, other, judged = load_results(old), load_results(folder), ["basis", "verdict", "reason"]
     assert again.table.loc[0, "basis"] == "fault_absent"
-    assert "that of Wang's lecture note" in (folder / "report.html").read_text(encoding="utf-8")
+    assert "the method of a lecture note by Huamin Wang" in (folder / "report.html").read_text(encoding="utf-8")
     assert again.engines == other.engines
     assert again.trajectories.keys() == other.trajectories.keys()
     for name in ("table", "agreements"):

@@ -98,7 +98,7 @@ SAID = re.compile(rf"(?P<no>not |undecided for )?(?P<engines>.+?)(?: {STEP}| \((
 USED = re.compile(
     rf"{STEP}(?:, except (?:with (?P<condition>.+) \((?P<covered>\d+) scenes(?:, {SIZE})?\))?"
     rf"(?: and )?(?:in (?P<named>.+?)(?: \({SIZE}\))?)?)?"
-    r"(?:, undecided in (?P<undecided>.+?))?(?:, no result in (?P<absent>\d+) scenes?(?P<declined> \(declined\))?)?"
+    r"(?:, undecided in (?P<undecided>.+?))?(?:, no result in (?P<absent>\d+) scenes?|, (?P<declined>\d+) scenes? declined)?"
 )
 
 
@@ -144,7 +144,7 @@ def verify_use(run, metric, engine, clause):
     assert named(said["named"], rest) if rest else said["named"] is None
     assert named(said["undecided"], kinds["undecided"]) if kinds["undecided"] else said["undecided"] is None
     absent = tested - set(finest)
-    assert int(said["absent"] or 0) == len(absent)
+    assert int(said["absent"] or said["declined"] or 0) == len(absent)
     declining = {row["scene"] for row in records(run) if (row["engine"], row["verdict"]) == (engine, "declined")}
     assert bool(said["declined"]) == (bool(absent) and absent <= declining)
     verify_size(run, metric, engine, clause, kinds["beyond"])

@@ -22,13 +22,13 @@ report: $(VENV)/.installed            ## set up, run the core catalogue, say whe
 	$(BIN)/dropspin run
 
 test: $(VENV)/.installed-dev          ## set up, run the test suite
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow and not extended"
 
 test-browser: $(VENV)/.installed-browser  ## the report, the replay and the site in a real browser; needs Chromium
 	$(BIN)/python -m pytest -n 2 --dist worksteal tests/browser
 
 test-all: lint test test-browser docs ## everything, and the studies that take minutes
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "slow or extended"
 
 test-engines: $(HEAVY_ENGINES:%=test-engine-%)  ## adapters of engines with an environment of their own; one alone: make test-engine-mjx
 

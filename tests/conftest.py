@@ -4,7 +4,7 @@ import gc
 import importlib.util
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import compress
 from pathlib import Path
 
@@ -20,13 +20,33 @@ WITH_PYBULLET = {"core_run", "repository", "engine_coverage"}
 """Fixtures, and a module of tests/support, that use PyBullet."""
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the tests that use PyBullet, or Node.js, where it is not installed; PyBullet has wheels for Python 3.11 alone."""
+    """Mark the cases beyond the samples, and leave out the tests of PyBullet, or Node.js, where it is not installed.
+
+    PyBullet has wheels for Python 3.11 alone.
+    """
+    for cases in sampled(items):
+        for case in cases:
+            case.add_marker("extended")
     lacks_pybullet, lacks_node = importlib.util.find_spec("pybullet") is None, shutil.which("node") is None
     if lacks_pybullet or lacks_node:
         left_out = [(lacks_pybullet and uses_pybullet(item)) or (lacks_node and uses_node(item)) for item in items]
         config.hook.pytest_deselected(items=list(compress(items, left_out)))
         items[:] = [item for item, is_left_out in zip(items, left_out, strict=True) if not is_left_out]
+
+
+def sampled(items: list[pytest.Item]) -> Iterator[list[pytest.Item]]:
+    """The cases of each test with the marker `sample(n)` but n of them, which are spread evenly and include the first."""
+    tests: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("sample"):
+            tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for cases in tests.values():
+        marker = cases[0].get_closest_marker("sample")
+        assert marker
+        kept = {number * len(cases) // marker.args[0] for number in range(marker.args[0])}
+        yield [case for number, case in enumerate(cases) if number not in kept]
 
 
 def uses_pybullet(item: pytest.Item) -> bool:

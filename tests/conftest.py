@@ -37,10 +37,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def sampled(items: list[pytest.Item]) -> Iterator[list[pytest.Item]]:
-    """The cases of each test with the marker `sample(n)` but n of them, which are spread evenly and include the first."""
+    """The cases of each test with the marker `sample(n)` but n of them, which are spread evenly and include the first; slow ones apart."""
     tests: dict[str, list[pytest.Item]] = {}
     for item in items:
-        if item.get_closest_marker("sample"):
+        if item.get_closest_marker("sample") and not item.get_closest_marker("slow"):
             tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
     for cases in tests.values():
         marker = cases[0].get_closest_marker("sample")

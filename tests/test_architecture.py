@@ -23,6 +23,7 @@ def modules_after(program):
     return set(done.stdout.splitlines()[-1].split())
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("program", "absent"),
     [

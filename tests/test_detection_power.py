@@ -12,6 +12,7 @@ from dropspin.scenarios.state import SPIN, VELOCITY
 FAULT = {fault.title: fault for fault in FAULTS}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("title", "name", "scene"),
     [
@@ -28,6 +29,7 @@ def test_a_parameter_wrong_by_three_per_mille_is_detected(title, name, scene):
     assert failures(name, FAULT[title], 3e-3, scene)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("title", "name", "s", "scene", "metric"),
     [

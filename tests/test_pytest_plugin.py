@@ -34,6 +34,7 @@ def repository(pytester, monkeypatch):
     return fill(pytester)
 
 
+@pytest.mark.extended
 def test_marked_test_is_called_for_each_engine(repository):
     """It passes, fails, or is skipped by the verdicts; the messages, the commands and the summary say which."""
     repository.makepyfile(absent="import no_such_engine", unfit="Engine = 1 / 0", test_own=SCENE_TEST)
@@ -94,6 +95,7 @@ def test_collecting_runs_no_scene(repository):
     assert not list(repository.path.glob(".pytest_cache/d/dropspin/*"))
 
 
+@pytest.mark.extended
 def test_documentation(repository):
     """The page's tests in a repository with its configuration file."""
     page = (DOCS / "pytest.md").read_text(encoding="utf-8")
@@ -116,6 +118,7 @@ def test_documentation(repository):
     done.assert_outcomes(passed=7)
 
 
+@pytest.mark.extended
 def test_messages_of_failing_tests(repository):
     """What failed, where the test called; a metric that was not measured; an unknown scene; a fixture without a scene."""
     repository.makepyfile(

@@ -39,6 +39,7 @@ pytest_plugin.Runs.dropspin = command
 """
 
 
+@pytest.mark.extended
 def test_workers_share_a_run(repository):
     """Two workers of pytest-xdist need a run at the same time: one makes it and the other waits; the summary has the rows of both."""
     second = SCENE_TEST.replace("test_scene", "test_again").replace("import pytest", "")
@@ -74,6 +75,7 @@ WAYS = {"pytest": [DROPSPIN.with_name("pytest")], "python -m pytest": [sys.execu
 QUICK = {("pytest", ""), ("python -m pytest", "."), ("dropspin", ".")}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("command", "path"),
     [pytest.param(*way, marks=[] if way in QUICK else pytest.mark.slow) for way in product(WAYS, ["", "."])],

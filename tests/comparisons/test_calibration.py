@@ -43,6 +43,7 @@ def without_step_search(monkeypatch):
     monkeypatch.setattr(calibration, "_largest_step", lambda motion, dt: (dt, "not searched"))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("name", "e", "dt"), CASES)
 @pytest.mark.usefixtures("without_step_search")
 def test_pasted_program_has_the_measured_restitution(name, e, dt, capsys):
@@ -143,6 +144,7 @@ def test_urdf_moves_as_the_body_of_the_program(shape, tmp_path):
     np.testing.assert_allclose(moments[0], moments[1], rtol=1e-12)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("e", [0.3, pytest.param(0.5, marks=pytest.mark.slow), pytest.param(0.8, marks=pytest.mark.slow), 0.95])
 def test_damper_holds_for_its_step_only(e):
     """v+ = v (1 - b h): at another step h than dt, e becomes (1 + e) h/dt - 1; at least 0, and 1 at the largest stable step."""
@@ -152,12 +154,14 @@ def test_damper_holds_for_its_step_only(e):
     assert value(found, "penetration") == pytest.approx(math.sqrt(2 * 9.81) * 2e-3 * 63.5 / 64, rel=0.02)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.usefixtures("without_step_search")
 @pytest.mark.parametrize("e", [0.3, pytest.param(0.5, marks=pytest.mark.slow), pytest.param(0.8, marks=pytest.mark.slow), 0.95])
 def test_restitution_of_bullet_does_not_depend_on_the_step(e):
     assert value(calibrate(engine("pybullet"), e, 2e-3), "restitution at half the step") == pytest.approx(e, abs=1e-12)
 
 
+@pytest.mark.extended
 def test_largest_stable_step_of_bullet_is_the_largest_tested():
     """Restitution at any step: no step up to 0.1 s gains energy."""
     assert value(calibrate(engine("pybullet"), 0.5, 1 / 30), "largest stable step") == calibration.LARGEST_STEP
@@ -187,6 +191,7 @@ def test_damping_ratios_of_the_spring_are_the_published_ones():
     np.testing.assert_allclose(found, [1.945, 1.243, 0.497, 0.255, 0.0744, 0.0165, 0.0032], rtol=2e-2, atol=5e-4)
 
 
+@pytest.mark.extended
 def test_spring_over_n_steps_has_the_depth_of_a_half_wave():
     """Over 40 steps u N dt/pi, less the damping; it is stable well beyond its step."""
     found = calibrate(engine("mujoco[spring_steps=40]"), 0.95, 1e-3)

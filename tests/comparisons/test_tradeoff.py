@@ -159,6 +159,7 @@ def spin():
     return tradeoff(SPIN.model_copy(update={"duration": 6.0}), engines)
 
 
+@pytest.mark.extended
 def test_errors_do_not_depend_on_the_number_of_jobs_and_costs_are_measured_alone(monkeypatch):
     """No errors are being measured at the time."""
     running, measure_errors, measure_costs = set(), study.errors_over_steps, study._with_costs
@@ -184,6 +185,7 @@ def test_errors_do_not_depend_on_the_number_of_jobs_and_costs_are_measured_alone
     ]
 
 
+@pytest.mark.extended
 def test_recommended_step_has_the_stated_error(spin):
     """Also the errors at half the step are within the tolerance."""
     for within in (1e-2, 1e-4, 1e-8):
@@ -289,6 +291,7 @@ def test_ladder_ends_where_the_budget_of_processor_time_is_spent(budget):
     assert all(finer < 0.9 * coarser for (_, coarser), (_, finer) in pairwise(ladder.steps))  # it could have gone on
 
 
+@pytest.mark.extended
 @pytest.mark.usefixtures("_processor_time_of_the_steps")
 @pytest.mark.usefixtures("engine_processes")
 def test_every_engine_that_was_asked_for_has_a_ladder_with_the_reason_of_its_end():
@@ -347,6 +350,7 @@ def test_every_cost_is_a_positive_time(spin):
         assert (point.cost > 0).all()
 
 
+@pytest.mark.extended
 def test_engine_that_declines_is_left_out_with_the_reason():
     short = load("drop-ball").model_copy(update={"duration": 0.6})
     found = tradeoff(short, ["mujoco", "mujoco[integrator=rk4]"])
@@ -362,6 +366,7 @@ def test_unknown_metric_and_declining_engines_are_errors():
         tradeoff(load("drop-ball"), ["mujoco[integrator=rk4]"])
 
 
+@pytest.mark.extended
 def test_accuracy_options_are_walked_beside_the_time_step():
     """Each value has a ladder of its own; a shorter inner step is more accurate at the coarsest steps."""
     found = tradeoff("fall-spin", InnerStep(), "position_error", budget=0.02)
@@ -392,6 +397,7 @@ class Hoarding(BatchSimulation):
         return self._states
 
 
+@pytest.mark.extended
 def test_memory_per_world_is_the_peak_of_a_batch():
     """Known: 40 kB, and the states; unknown where the system is not Linux."""
     made = type("Hoarder", (Exact,), {"name": "hoarder", "prepare_batch": lambda self, members, dt: Hoarding(members)})()

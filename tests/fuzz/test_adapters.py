@@ -2,6 +2,7 @@
 
 from unittest import mock
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -142,6 +143,7 @@ def test_answers_of_an_adapter_are_used_or_end_its_study(changes, command):
     run_with(changes, command)
 
 
+@pytest.mark.extended
 @cases(20)
 @given(METHODS.map(lambda method: f"{method} = lambda *given, **named: ") | st.just(""), ENDLESS)
 def test_adapters_that_never_answer_cost_their_rows(place, action):

@@ -2,6 +2,7 @@
 
 import tomllib
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -20,6 +21,7 @@ COMMANDS = st.sampled_from(
 )
 
 
+@pytest.mark.extended
 @cases(200)
 @given(st.data(), COMMANDS)
 def test_baselines_are_used_or_refused(sound, data, command):

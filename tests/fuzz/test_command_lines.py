@@ -3,6 +3,7 @@
 import os
 
 import click
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -100,6 +101,7 @@ def outputs(line: tuple[str, ...]) -> list[str]:
     return written + {"accept": ["dropspin-baseline.toml"], "report": list(line[1:]), "replay": list(line[1:])}.get(line[0], [])
 
 
+@pytest.mark.extended
 @cases(300)
 @given(command_lines())
 def test_command_lines_are_done_or_refused(sound, line):
@@ -111,6 +113,7 @@ def test_command_lines_are_done_or_refused(sound, line):
 RAW = st.lists(ODD, min_size=1, max_size=4).filter(lambda line: line[0] not in COMMANDS).map(tuple)
 
 
+@pytest.mark.extended
 @cases(100)
 @given((command_lines() | RAW).filter(lambda line: "\0" not in "".join(line)))  # which no process can be given
 def test_command_lines_in_a_process_of_their_own_are_done_or_refused(sound, line):

@@ -2,6 +2,7 @@
 
 import tomllib
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -48,6 +49,7 @@ def test_scenes_are_shown_or_refused(content, name, as_json):
         run(work, "show", *(["--json"] if as_json else []), "--", name, outputs=[])
 
 
+@pytest.mark.extended
 @cases(150)
 @given(edited(BALL | ENSEMBLE).map(toml) | WELL_TYPED, NAMES, st.sampled_from(["wang", "mujoco", "pybullet"]))
 def test_scenes_are_run_or_refused(content, name, engine):

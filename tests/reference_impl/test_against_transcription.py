@@ -33,6 +33,7 @@ def reference_points(state, points):
     return Rotation.from_quat(state[ORIENTATION]).apply(points)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("sticking", [False, True], ids=["eq15", "eq17"])
 @pytest.mark.parametrize("seed", range(12))
 def test_fifty_steps_through_contacts_match_the_transcription(seed, sticking):

@@ -58,6 +58,7 @@ def test_mean_contact_leaves_vertices_approaching():
     assert left / several > 0.2
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("friction", [0.2, 1.0])
 def test_sequential_friction_of_a_sliding_ball(friction):
     """Δv_t = -f (1 + e) |u_n| t, to 1e-9 in each direction."""
@@ -70,6 +71,7 @@ def test_sequential_friction_of_a_sliding_ball(friction):
         np.testing.assert_allclose(after[VELOCITY], [6.0 - 0.6 * lost, e, 8.0 - 0.8 * lost], rtol=0, atol=1e-9)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("law", "friction"), [("normal", 0.0), ("coulomb", 0.4), ("coulomb", 1.0)])
 @pytest.mark.parametrize("e", [0.0, 0.5])
 @pytest.mark.filterwarnings("ignore:.*not solved")

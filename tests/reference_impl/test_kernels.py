@@ -86,6 +86,7 @@ def test_interpreted_compiled_and_ensemble_results_agree_to_the_last_bit(choices
     assert len(results) == len(choices)  # no two choices are the same method
 
 
+@pytest.mark.extended
 def test_vertices_in_blocks_collide_as_one_after_the_other(monkeypatch):
     """With many vertices, in no order, to the last bit."""
     rng = np.random.default_rng(4)
@@ -277,6 +278,7 @@ def test_kernels_of_other_numba_settings_are_compiled_anew(short, fall):
     assert fall(short, SHORT_FALL, **own) == ["-1.0", "1", "True"]
 
 
+@pytest.mark.extended
 def test_unwritable_cache_is_no_error(short, fall):
     (short / "a-file").write_text("")
     assert fall(short, SHORT_FALL, NUMBA_CACHE_DIR=str(short / "a-file")) == ["-1.0", "0", "True"]

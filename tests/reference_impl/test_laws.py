@@ -40,6 +40,7 @@ def supremum(mu, rho, sticking):
     return (T + np.sqrt(T**2 - 4 * mu**2)) / 2
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("mu", "solid", "friction", "published"),
     [
@@ -73,6 +74,7 @@ def test_energy_gain_of_the_note_s_law_has_the_known_supremum(mu, solid, frictio
     assert -found.fun <= supremum(mu, 7 if solid else 3, friction == STICKS) * (1 + 1e-9)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("law", ["normal", "poisson", "clamped"])
 @pytest.mark.parametrize("friction", [0.0, STICKS])
 def test_law_never_adds_energy(law, friction):
@@ -114,6 +116,7 @@ def largest_gain(law):
     return worst
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("friction", [0.3, 1.0, 1.5, 5.0])
 def test_coulomb_adds_no_energy_at_restitution_0(friction):
     """6,000 random impacts, some of which jam. At other restitutions sticking adds energy where eq 17 does."""

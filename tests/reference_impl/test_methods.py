@@ -38,6 +38,7 @@ def test_order_is_the_lowest_of_the_parts_that_a_motion_needs(methods, gravity, 
     assert methods.order(gravity=gravity, damping=damping, floor=floor) == order
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("law", LAWS)
 def test_laws_without_a_friction_cone_reject_a_finite_coefficient(law):
     ball = Body(1.0, np.eye(3), np.zeros((1, 3)), (0.1, 0.1, 0.1))

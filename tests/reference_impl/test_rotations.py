@@ -42,6 +42,7 @@ def test_every_rotation_of_finite_order_is_measured():
     assert {name for name, leaf in ROTATIONS.items() if leaf.ORDER not in (None, math.inf)} == set(ASYMPTOTIC_RANGES)
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize("moments", [(1, 2, 3), (3, 1, 2), (0.3, 0.9, 1.0)])
 @pytest.mark.parametrize("rotation", ASYMPTOTIC_RANGES)
 def test_observed_order_is_the_declared_one(rotation, moments):

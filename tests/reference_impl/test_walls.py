@@ -25,6 +25,7 @@ def between_walls(surface, floor=None):
     return World(G, floor or surface, walls=walls)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("sticking", [False, True], ids=["eq15", "eq17"])
 def test_motion_between_walls_matches_the_transcription(sticking):
     """To 1e-13 of each part's scale after 1000 steps in which all three planes act (measured: 8e-15)."""
@@ -41,6 +42,7 @@ def test_motion_between_walls_matches_the_transcription(sticking):
         assert np.abs(found[:, part] - np.array(expected)[:, part]).max() <= 1e-13 * np.abs(np.array(expected)[:, part]).max()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("body", "methods"),
     [
@@ -76,6 +78,7 @@ def test_ball_at_a_smooth_elastic_wall_moves_as_the_mirror_image_of_the_free_one
     np.testing.assert_allclose(found[:, 1:7], free[:, 1:7], atol=1e-15)
 
 
+@pytest.mark.extended
 def test_bodies_between_walls_move_in_an_ensemble_as_alone():
     """To the last bit, those that touch a wall and those that do not."""
     starts = np.tile(THROWN, (19, 1))
@@ -86,6 +89,7 @@ def test_bodies_between_walls_move_in_an_ensemble_as_alone():
         np.testing.assert_array_equal(reference_impl.simulate(start, BOX, worlds, 1e-3, 300), rows)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("methods", [Methods(), Methods(law="normal", contact="sequential")], ids=str)
 def test_floor_carries_no_point_beyond_its_end(methods):
     floor = Floor(0.0, 0.0, 0.0, (1.0, 0.5), 0.3)

@@ -25,6 +25,7 @@ def results():
     return run(scene, ["mujoco", "wang[contact=sequential,law=coulomb]"], [4e-3, 2e-3, 1e-3])
 
 
+@pytest.mark.extended
 def test_page_names_the_recording_and_no_exact_solution(results):
     summary = overview(results)
     page = html_report(results, summary, report_charts(results))

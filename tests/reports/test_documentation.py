@@ -75,6 +75,7 @@ def _no_bytecode(monkeypatch):
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
 
 
+@pytest.mark.extended
 @pytest.mark.usefixtures("_no_bytecode")
 def test_tutorial_shows_the_output_and_exit_codes_of_its_commands(tmp_path):
     """The first check of the adapter fails, the second passes; run and accept pass; the change fails; without it all results hold."""
@@ -83,6 +84,7 @@ def test_tutorial_shows_the_output_and_exit_codes_of_its_commands(tmp_path):
     assert (tmp_path / "out/ball/report.html").exists()
 
 
+@pytest.mark.extended
 def test_calibration_page_shows_the_output_of_its_first_command(tmp_path):
     """The second command, with `--as urdf`, takes longer; the tests of the command line run it."""
     assert follow("calibrate.md", tmp_path, end="dropspin calibrate -e pybullet") == [0]
@@ -108,6 +110,7 @@ def test_commands_of_the_page_on_engines_measure_the_values_printed_there(comman
     verify_findings(command, tmp_path)
 
 
+@pytest.mark.extended
 def test_python_of_the_readme_and_of_the_replay_page_runs(tmp_path, monkeypatch):
     """One after the other, in one namespace."""
     monkeypatch.chdir(tmp_path)

@@ -379,6 +379,7 @@ def test_an_empty_folder_is_not_a_run(tmp_path):
         load_results(tmp_path)
 
 
+@pytest.mark.extended
 def test_plots_are_written_on_request_and_reproducible_byte_for_byte(results, tmp_path):
     """`fill` with SVG writes one file for each group of charts, twice the same."""
     files = []
@@ -403,6 +404,7 @@ def test_the_terminal_table_fits_80_columns(results, capsys):
     assert max(map(len, text.splitlines())) <= 80
 
 
+@pytest.mark.extended
 def test_table_of_many_engines_cuts_no_number(capsys):
     """Engines whose names begin alike can be distinguished; those that do not fit are named."""
     from rich.console import Console
@@ -424,6 +426,7 @@ def test_table_of_many_engines_cuts_no_number(capsys):
                 assert formatted(value) in text or engine in left_out
 
 
+@pytest.mark.extended
 def test_setting_errors_are_compared_with_the_calibrated_profile():
     """Beside its calibrated profile a default one gets the share of each error that is due to settings: in page, table and sentence."""
     found = run("drop-ball", ["pybullet", "pybullet[profile=default]"], [4e-3, 2e-3])

@@ -51,6 +51,7 @@ def test_summary_of_the_default_run_has_at_most_48_lines_of_80_columns(core, cap
     assert shown == [scene for scene, found in core.statuses().items() if any(one.words not in FINE for one in found.values())]
 
 
+@pytest.mark.extended
 def test_summary_of_many_scenes_shows_those_with_findings_and_counts_the_others(core, capsys):
     many = repeated(core, 4)
     lines = printed(many, capsys)
@@ -86,6 +87,7 @@ def test_row_shows_the_metric_of_the_largest_known_error(core, capsys):
     assert line.split()[1:5] == ["orientation,", "rad", "†", f"{ratios.max():#.2g}"]
 
 
+@pytest.mark.extended
 def test_failing_scene_stays_when_others_are_left_out(core, capsys):
     """Whatever else there is to find; its failures follow with one command."""
     many = repeated(core, 2)
@@ -98,6 +100,7 @@ def test_failing_scene_stays_when_others_are_left_out(core, capsys):
     assert sum(line.startswith("Reproduce: dropspin run ") for line in lines) == 1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("width", [60, 80, 160])
 def test_matrix_of_many_engines_leaves_out_engines_before_it_breaks_a_number(core, capsys, width):
     """It names those that are left out."""

@@ -41,6 +41,7 @@ def test_ball_on_a_frictionless_floor_keeps_its_spin():
     np.testing.assert_allclose(after[RATES], [2, 2.4, 0.5, 1, 7, 40], rtol=0, atol=1e-13)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("restitution", [0.1, 0.3, 0.5, 0.9])
 @pytest.mark.parametrize("duration", [1.5, 10.0])
 def test_short_flights_are_found(restitution, duration):

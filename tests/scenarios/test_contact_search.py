@@ -55,6 +55,7 @@ def drawn_flight(seed, gravity):
     return body.hull, state, body.inertia_tensor, min(5.0, 60.0 / np.linalg.norm(spin))
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("gravity", [0.0, 1.6])
 @pytest.mark.parametrize("seed", range(12))
 def test_deepest_dip_of_a_tumbling_body_is_found_and_a_miss_is_none(seed, gravity):

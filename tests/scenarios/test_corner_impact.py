@@ -145,6 +145,7 @@ def test_tumble_matches_an_integrator_with_events(friction):
     assert len(truth.events) >= 5
 
 
+@pytest.mark.extended
 def test_solution_ends_where_a_disturbance_has_grown_too_much():
     """At the tenth impact at the latest; until then no part is below the floor, and a disturbance of 1e-10 grows to 1e-5 at most."""
     scene = load("drop-box-corner").model_copy(update={"duration": 5.0})
@@ -196,6 +197,7 @@ def box_at(clearance, velocity):
     return load(content | {"duration": 1.0})
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("clearance", [0.0, -1e-12, 1e-12, -5e-10])
 def test_corner_that_leaves_the_floor_strikes_only_when_it_returns(clearance):
     """Thrown up from the floor, or from a rounding error below it: the impact is after 2 v/g."""
@@ -287,6 +289,7 @@ def test_flat_box_with_some_descending_corners_does_not_sink_into_the_floor(spin
         assert lowest_height(scene, motion).min() >= -1e-9
 
 
+@pytest.mark.extended
 def test_solution_ends_at_the_same_time_in_other_units():
     """A tumble with ten impacts, in millimetres and in grams."""
     scene = load("drop-box-anyhow")

@@ -43,6 +43,7 @@ def test_path_matches_forty_digits(rate):
                 assert abs(found.velocity[n, axis] - v) <= 1e-14 * (abs(v0) + abs(g) * t)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("rate", [0.05, 0.7])
 @pytest.mark.parametrize("spin", [(0.3, 5.0, -0.2), (4.0, 0.1, 2.0)])
 def test_rotation_matches_taylor_series(rate, spin):

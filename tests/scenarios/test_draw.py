@@ -16,6 +16,7 @@ def drawn():
     return draw(15, 7)
 
 
+@pytest.mark.extended
 def test_a_scene_depends_on_its_seed_and_number_only(drawn):
     """Not on how many are drawn; other seeds and numbers give other scenes."""
     assert draw(3, 7) == drawn[:3]
@@ -71,6 +72,7 @@ def test_draws_span_the_stated_ranges():
     assert any(g[1] < 0.0 and g[0] and g[2] for g, floor in gravity if floor)
 
 
+@pytest.mark.extended
 def test_full_inertia_tensors_are_drawn_with_a_floor_and_without(drawn):
     corners = [drawn_scene(1, number) for number in range(7, 50, 10)]
     assert any(not is_diagonal(scene.body.inertia_tensor) for scene in corners)

@@ -25,6 +25,7 @@ def integrated(start, pull, friction, t):
     return np.array([ux, 0, uz], dtype=float), np.array([x, 0, z], dtype=float)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("friction", [1.0, 2.0, 40.0])  # with a pull of 2 m/s², 1 and 2 make an exponent 0
 @pytest.mark.parametrize("angle", [0.3, 2.8])
 def test_motion_is_that_of_a_taylor_integration(friction, angle):

@@ -28,6 +28,7 @@ def turned(size, largest):
     return (orientations(size, largest) * own.inv()).as_rotvec()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("largest", [np.pi, 1.0, 1e-3])
 def test_rotations_are_uniform(largest):
     """Angles have the density 1 - cos θ up to the largest and axes are uniform on the sphere, by Kolmogorov-Smirnov tests at 1 %."""
@@ -52,6 +53,7 @@ def test_default_turn_gives_uniform_attitudes():
             assert stats.kstest(component, stats.uniform(-1, 2).cdf).pvalue > 0.01
 
 
+@pytest.mark.extended
 def test_rates_are_uniform_and_clearances_equal():
     """Rates are uniform about the scene's; every member has the scene's clearance; a second call gives the same starts."""
     scene = scene_with(size=1000, velocity=[0.5, 0.0, 0.0], angular_velocity=[0.0, 3.0, 0.0])
@@ -66,6 +68,7 @@ def test_rates_are_uniform_and_clearances_equal():
     assert not np.isclose(states[:, ORIENTATION], [member.initial_state[ORIENTATION] for member in other]).all(axis=1).any()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("largest", [1e-9, 1e-7, 1e-3, 0.099, 0.101])
 def test_small_rotations_are_uniform(largest):
     """Where 1 - cos θ is θ²/2 the cube of the angle is uniform."""

@@ -41,6 +41,7 @@ def taylor_solution(case):
     return times, np.array([[float(c) for c in q] for q, _ in exact]), np.array([[float(c) for c in w] for _, w in exact])
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("start", [IDENTITY, TILTED], ids=["upright", "tilted"])
 @pytest.mark.parametrize("case", CASES)
 def test_attitude_and_spin_match_taylor_series(case, start):

@@ -47,6 +47,7 @@ def exact_motion(moments, spin, orientation, times):
     return np.array([[float(c) for c in q] for q, _ in found]), np.array([[float(c) for c in w] for _, w in found])
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("draw", [principal, separatrix, symmetric])
 def test_attitude_of_extreme_starts_is_right_to_1e_13_of_the_angle_turned(draw, seed):
@@ -108,6 +109,7 @@ def body_spin(orientation, spin):
 TILTED = np.array([0.2, -0.3, 0.1, 0.9]) / np.linalg.norm([0.2, -0.3, 0.1, 0.9])
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("offset", [0.0, 1e-16, 1e-9])
 def test_tilted_start_is_taken_at_its_exact_numbers(offset):
     """Near the unstable axis, in a tilted attitude: right to 1e-13 of the angle for the numbers given, beyond the horizon too."""
@@ -117,6 +119,7 @@ def test_tilted_start_is_taken_at_its_exact_numbers(offset):
     assert np.all(angle_between_orientations(orientations, exact) <= 1e-13 * 3.0 * times)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("moments", [(1.0, 2.0, 3.0), (1.0, 1.2, 2.0)])
 def test_horizon_is_where_one_ulp_has_grown_to_its_tolerance(moments):
     """A start whose quaternion is one eps off differs at the horizon by 0.01 to 1 of the tolerance, and by more than it a little later."""

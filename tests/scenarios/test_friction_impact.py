@@ -127,6 +127,7 @@ def integrated(K, u, e, friction, restitution):
     return None if len(first.t_events[1]) + len(second.t_events[1]) else second.y[:3, -1]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("restitution", ENDS)
 def test_integrated_law_matches_an_integration_over_the_normal_impulse(restitution):
     """For impacts whose slip turns and does not stop: to 1e-9."""

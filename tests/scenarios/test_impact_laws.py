@@ -85,6 +85,7 @@ def by_mpmath(law, corner, v, w, e, friction, inertia=INERTIA, mass=MASS):
     return [float(value) for value in found[:6]]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("law", [law for law in LAWS if law not in FRICTION_LAWS])
 @pytest.mark.parametrize("friction", ["none", "infinite", 0.3])
 @given(vectors.filter(lambda r: r[1] < -0.1), vectors.filter(lambda v: v[1] < -0.1), vectors, st.floats(0, 1))
@@ -100,6 +101,7 @@ def test_each_law_matches_forty_digits(law, friction, corner, v, w, e):
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12 * max(1.0, np.abs(exact).max()))
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", ["drop-box-corner", "drop-box-sticking", "drop-box-tumble"])
 @pytest.mark.parametrize("law", ["normal", "note", "poisson", "clamped"])
 def test_flight_and_first_impact_match_forty_digits(name, law):

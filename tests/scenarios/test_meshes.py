@@ -73,6 +73,7 @@ def prism(sides, random):
     return points @ (turn * np.sign(np.linalg.det(turn))), np.array(faces)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("offset", [0.0, 1e3, 1e6])
 @pytest.mark.parametrize("inside_out", [False, True])
 def test_solids_of_any_place_have_the_moments_of_forty_digits(offset, inside_out):

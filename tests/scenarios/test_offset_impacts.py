@@ -34,6 +34,7 @@ def lowest(body, state):
     return corner - across[:, 1] / np.sqrt(across[1, 1])
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", BODIES)
 def test_first_impact_of_a_tumbling_offset_body_is_that_of_an_integration(name):
     """Of six random throws, with every kind of friction: the time to 1e-11, velocity and angular velocity after it to 1e-9."""

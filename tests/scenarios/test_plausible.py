@@ -69,6 +69,7 @@ def test_gravity_along_the_floor_is_mentioned(gravity):
         load(scene(BOX, **FLOOR | {"gravity": {"acceleration": gravity}}))
 
 
+@pytest.mark.extended
 def test_scenes_on_slopes_in_free_fall_and_drawn_ones_are_not_mentioned():
     with warnings.catch_warnings():
         warnings.simplefilter("error")

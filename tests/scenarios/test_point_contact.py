@@ -79,6 +79,7 @@ def extrapolated(rates, start, end, steps, columns=11):
     return np.array(state, dtype=float), correction
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "scene",
     [
@@ -102,6 +103,7 @@ def test_motion_is_that_of_an_integration_with_25_digits(scene):
     assert np.abs(faulty - expected).max() > 1e-5
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("friction", ["none", "infinite"])
 def test_a_body_on_a_corner_moves_as_in_an_integration_with_25_digits(friction):
     """With three different moments about axes that are not those of the box; the corner rests, or slides without friction."""
@@ -143,6 +145,7 @@ def stiffness(angle, precession, spin, half_length=0.02, radius=0.1):
 STEADY = [(0.5, None, 0.02), (0.2, None, 1e-5), (1.0, 8.0, 0.02), (1.0, -20.0, 0.03), (0.7, 15.0, 0.02)]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("angle", "precession", "half_length"), STEADY)
 def test_steady_rolling_on_a_rim(angle, precession, half_length):
     """The angle stays to 1e-12, and the precession has its rate; the centre rests or goes round in a circle; the motion is stable."""
@@ -207,6 +210,7 @@ ROCKING = [
 ]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("friction", ["none", "infinite"])
 @pytest.mark.parametrize(("body", "rest", "axis", "height", "curvature"), ROCKING)
 def test_small_oscillations_have_their_frequency_up_to_the_square_of_the_amplitude(body, rest, axis, height, curvature, friction):
@@ -232,6 +236,7 @@ def test_bodies_at_rest_where_they_can_lie_stay_there():
     assert "amplifies" in upright.ends
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("scene", "ends"),
     [

@@ -79,6 +79,7 @@ def on_a_floor(body):
     return load({"duration": 1.0, "body": body, "start": start, "gravity": {"acceleration": [0.0, -9.8, 0.0]}, "floor": floor}).body
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", BODIES)
 def test_moments_of_masses_inside_a_body_are_accepted_and_larger_ones_are_refused(name):
     """Three to six masses anywhere inside and on the surface, with their centre of mass and their full tensor."""

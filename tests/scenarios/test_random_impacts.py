@@ -91,6 +91,7 @@ def verify_solutions(seeds):
     return total, lacking
 
 
+@pytest.mark.extended
 def test_solutions_match_an_event_driven_integration_up_to_their_horizon():
     """Of 11 bodies: every kind with every friction. The slow test has ten thousand."""
     total, lacking = verify_solutions([0, 1, 2, 3, 4, 6, 9, 11, 14, 25, 35])

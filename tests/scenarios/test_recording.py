@@ -27,6 +27,7 @@ def with_table(folder, table, before=""):
     return path
 
 
+@pytest.mark.extended
 def test_catalogue_has_every_fifth_toss_of_the_shipped_recording():
     shipped, made = load("toss-cube").recording, toss_cube_scene.chosen(load_log("toss-cube"))
     assert [toss.name for toss in shipped.tosses] == [toss.name for toss in made.tosses]

@@ -135,6 +135,7 @@ def test_speed_on_a_slope_tends_to_mcgeers_fixed_point(speed):
     assert np.sum(q[1:] * q[:-1], axis=1).min() > 0.9  # also from one turn to the next
 
 
+@pytest.mark.extended
 @settings(max_examples=60, deadline=None)
 @given(
     st.integers(3, 12),

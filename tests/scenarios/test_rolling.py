@@ -50,6 +50,7 @@ def integrated(scene, t):
     return np.array(found, dtype=float)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "scene",
     [

@@ -94,6 +94,7 @@ def test_moments_of_surfaces_of_parts():
     np.testing.assert_allclose(capsule.moments[0], 2.0 * across / (sides + ends), rtol=1e-14)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("half_extents", [(0.1, 0.2, 0.35), (0.02, 0.4, 0.05)])
 def test_moments_of_the_surface_of_an_ellipsoid(half_extents):
     """Against the area element |∂x/∂θ × ∂x/∂φ|, integrated over an octant by Gauss and Legendre's rule; measured 3e-15."""
@@ -158,6 +159,7 @@ def half_height(name, angle):
     }[name]()
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", ROUND)
 @pytest.mark.parametrize("spin", [3.0, -40.0])
 def test_contact_and_impact_about_a_fixed_axis_in_25_digits(name, spin):
@@ -183,6 +185,7 @@ def test_contact_and_impact_about_a_fixed_axis_in_25_digits(name, spin):
     np.testing.assert_allclose(found.after[[8, 10]], [float(value) for value in after], rtol=1e-12)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ROUND)
 def test_first_contact_of_a_tumbling_body_is_that_of_a_fine_search(name):
     """Thirty random starts: the lowest height along the exact flight is positive before the contact, and zero at it."""

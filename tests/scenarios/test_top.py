@@ -64,6 +64,7 @@ def by_angles(lean, spin, precession, nutation, times):
         return [np.array(solution(time), dtype=float) for time in times]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("lean", "spin", "precession", "nutation"),
     [(0.35, 120.0, 0.0, 0.0), (0.3, -150.0, -1.0, 2.0)],
@@ -100,6 +101,7 @@ def test_integrals_of_the_motion_are_constant():
     assert np.ptp(motion.position - arm, axis=0).max() < 1e-15
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_steady_precession_has_the_rate_of_its_equation(sign):
     """A Ω² cos θ - C ω·n Ω + M g l = 0: the slow and the fast rate."""
@@ -147,6 +149,7 @@ def test_other_problems_are_no_top(change):
     assert truth is None or truth.name != "rough-contact"
 
 
+@pytest.mark.extended
 def test_a_coefficient_of_friction_that_suffices_holds_the_tip():
     """A coefficient of 0.5 suffices at all times, 0.01 not even at the start."""
     times = np.linspace(0.0, 0.5, 9)
@@ -160,6 +163,7 @@ def test_moving_tip_is_no_top():
     assert truth is None or truth.name != "rough-contact"
 
 
+@pytest.mark.extended
 def test_cone_of_points_is_a_top_with_two_different_moments():
     """An apex below eight points on a circle, whose centre of mass is the origin; dL/dt = r × M g at each time."""
     corners = [[0.0, -0.16, 0.0], *([0.12 * math.cos(k * math.pi / 4), 0.02, 0.12 * math.sin(k * math.pi / 4)] for k in range(8))]

@@ -54,6 +54,7 @@ def without_explanations(monkeypatch):
     monkeypatch.setattr(motions, "explain_motion", lambda *asked: None)
 
 
+@pytest.mark.extended
 def test_documented_adapter_passes_and_is_short():
     assert not_passed(documented()) == {}
     assert len([line for line in ADAPTER.splitlines() if line.strip()]) <= 40
@@ -63,6 +64,7 @@ ELLIPSOID = {"striking ellipsoid"}
 STRIKES = {"corner", "striking capsule", "striking cylinder", "striking mesh", *ELLIPSOID}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "noted"),
     [
@@ -127,6 +129,7 @@ def record(first, given):
     return STATE, RECORD.format(first, given)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("changes", "check", "message"),
     [
@@ -206,6 +209,7 @@ def body(**values):
     return changed
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("change", "check", "message"),
     [
@@ -445,6 +449,7 @@ def test_engine_without_batches_declines_their_check():
     assert (found.outcome, found.message) == ("declined", "prepare_batch returns None: the engine simulates one scene at a time")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("attribute", "member", "scene"), [("friction", 2, "slippery-floor"), ("rest_speed", 3, "corner")])
 def test_batch_with_a_number_of_its_first_scene_fails(attribute, member, scene):
     class First(Wang):

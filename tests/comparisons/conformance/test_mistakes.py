@@ -102,6 +102,7 @@ MISTAKES = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("title", MISTAKES)
 def test_mistake_is_named(title):
     message, check, methods = MISTAKES[title]
@@ -109,6 +110,7 @@ def test_mistake_is_named(title):
     assert re.search(message, text), text
 
 
+@pytest.mark.extended
 def test_right_student_is_not_corrected():
     """What the method itself has wrong is noted: no gyroscopic term, and the laboratory's rule of friction."""
     checks = (
@@ -143,6 +145,7 @@ def test_law_of_the_note_is_recognised_where_it_is_not_stated():
     assert found(engine_, "corner") == {"corner": OF_NOTE}
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", ["wang", "mujoco", "mujoco[kappa=0.5]", "pybullet", "pybullet[coordinates=multibody]", "rapier", "dart"])
 def test_no_mistake_is_named_in_a_right_engine(name):
     """Nor in one whose restitution depends on the phase of the step, as with a penetration that is only partly resolved in each step."""
@@ -150,6 +153,7 @@ def test_no_mistake_is_named_in_a_right_engine(name):
     assert not [text for text in messages if not text.startswith("restitution depends on the speed")]
 
 
+@pytest.mark.extended
 def test_restitution_that_depends_on_the_speed_does_not_decay():
     slower = {"wanted_normal": lambda self, u: -(1.0 + self.restitution / (1.0 - 0.5 * u)) * u}
     [message] = found(student(**slower), "later impacts").values()

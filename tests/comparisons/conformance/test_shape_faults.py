@@ -18,6 +18,7 @@ def checked(adapter, shape):
     return run_check(EngineEntry(adapter.label, adapter), f"striking {shape}")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("shape", "built", "message"),
     [

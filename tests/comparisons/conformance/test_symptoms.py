@@ -29,6 +29,7 @@ def test_ball_by_the_law_of_the_exact_solution_passes():
     assert not any(engine.declines(probe.scene) for probe in PROBES if probe.name in BALLS)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("law", "check", "message"),
     [
@@ -109,6 +110,7 @@ def test_height_of_the_first_contact_is_stated_only_if_it_is_wrong():
     assert truth_for(ball.scene).events[0].before[1] == pytest.approx(0.1)
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize(
     ("title", "check", "message"),
     [

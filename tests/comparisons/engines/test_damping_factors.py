@@ -47,6 +47,7 @@ def test_velocities_decay_by_the_factors(engine, dt):
         assert limitation.explained_errors["angular_momentum_error"] == pytest.approx(1.1 / 4.0, rel=1e-3)  # of K^n - K^2n, where K^n = ½
 
 
+@pytest.mark.extended
 def test_limitation_of_factors_explains_the_error_of_steps_of_another_size():
     """Expectations that it fails with half the time step are `limited`, for each rotation; at the factors' own step, they fail."""
     expected = [

@@ -25,6 +25,7 @@ ENGINES = [
 CASES = list(product(ENGINES, QUICK))
 
 
+@pytest.mark.sample(64)
 @pytest.mark.parametrize(("name", "scene_name"), CASES)
 def test_engine_builds_the_scene_and_records_what_it_steps(name, scene_name):
     """State, mass, inertia and gravity to 8 eps; shapes; finite; advance and record take the same steps, bit for bit."""
@@ -59,6 +60,7 @@ def test_engine_builds_the_scene_and_records_what_it_steps(name, scene_name):
     np.testing.assert_array_equal(rows, one_by_one)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", ENGINES)
 def test_scene_gives_the_same_bits_after_and_beside_others(name):
     """A, B, A: a scene gives the same bits after another scene, and while another simulation is open."""

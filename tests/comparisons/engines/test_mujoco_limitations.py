@@ -8,6 +8,7 @@ from dropspin.comparisons.engines.mujoco_limitations import limitations_met
 from dropspin.comparisons.engines.registry import engine
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("name", "explained", "metric"),
     [

@@ -83,6 +83,7 @@ def test_mujoco_has_no_restitution_by_default():
         assert apparent("mujoco[profile=default]", 0.95, dt) < 0.05
 
 
+@pytest.mark.extended
 def test_error_of_the_defaults_alone_is_a_setting_error(monkeypatch):
     """It does not vanish as dt → 0 and the calibrated profile does not have it; without that profile in the run it is a model error."""
     monkeypatch.setattr("dropspin.comparisons.running.start_phases.QUICK_START_PHASES", 2)
@@ -131,6 +132,7 @@ def test_bullet_tumbles_as_mujoco_with_the_same_discretisation():
         np.testing.assert_allclose(first, second, atol=1e-9 * 5)
 
 
+@pytest.mark.extended
 def test_bullet_reports_short_rotations_and_clamped_friction():
     """Rotations are too small beyond π/4 rad a step; a contact slips that needs friction above 10 times its normal force."""
 

@@ -108,6 +108,7 @@ def test_no_shape_is_left_out():
     assert set(SHAPES) <= set(BODIES)
 
 
+@pytest.mark.sample(9)
 @pytest.mark.parametrize(("name", "kind"), CELLS)
 @pytest.mark.parametrize("engine_name", ENGINES)
 def test_a_shape_moves_as_its_exact_solution_at_first_order(engine_name, name, kind):

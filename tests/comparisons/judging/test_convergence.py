@@ -23,6 +23,7 @@ def run(scene, engine, dts=STEPS):
     return ds.run(scene, engine, dts)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("engine", "cause", "order"),
     [
@@ -158,6 +159,7 @@ def with_error(order, error):
     return type("Made", (WithError,), {"order": order, "error": staticmethod(error), "__doc__": "made"})()
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("claimed", "error", "verdict"),
     [
@@ -206,6 +208,7 @@ def test_known_fault_is_allowed_for_the_named_engine_only(core_run):
     assert other.exit_code() == 1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("scene", "engine"),
     [

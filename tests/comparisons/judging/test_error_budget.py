@@ -206,6 +206,7 @@ def test_budget_does_not_depend_on_units(decades, sign):
     np.testing.assert_allclose(sorted([scaled.lower, scaled.upper]), sorted([factor * found.lower, factor * found.upper]), rtol=1e-6)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("steps", [3, 5])
 @pytest.mark.parametrize(
     "family",
@@ -228,6 +229,7 @@ def test_intervals_contain_the_asymptotic_error(family, steps):
     assert not any(one.cause == "discretisation" for one in found if one.is_large)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("steps", [3, 5])
 @pytest.mark.parametrize("family", ["order 1", "order 2", "order 3", "order 4"])
 def test_most_series_of_powers_are_decided(family, steps):
@@ -237,12 +239,14 @@ def test_most_series_of_powers_are_decided(family, steps):
     assert unresolved <= (1 / 3 if steps == 3 else 0.1)
 
 
+@pytest.mark.extended
 def test_intervals_of_maxima_contain_the_asymptotic_error():
     """Although a part that is smaller at all three time steps does not show."""
     found = interval_coverage.outcomes("maxima", 200, 3, interval_coverage.COMPARABLE)
     assert np.mean([one.is_covered for one in found]) >= 0.95
 
 
+@pytest.mark.extended
 def test_wrong_parameters_of_engines_are_found():
     """Intervals contain the error of the wrong inertia, known from the exact solution of the wrong body; no large one is missed."""
     found = [one for _, one in engine_coverage.outcomes("inertia", 4)]
@@ -251,6 +255,7 @@ def test_wrong_parameters_of_engines_are_found():
     assert any(one.cause == "model" for one in found)
 
 
+@pytest.mark.extended
 def test_intervals_contain_the_largest_error_over_time_of_wrong_friction():
     """The largest error over time is at another time at finer steps; the components at one time show that it may be larger."""
     found = [one for _, one in engine_coverage.outcomes("friction", 8)]

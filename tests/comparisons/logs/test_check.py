@@ -37,11 +37,13 @@ def cure(finding: Finding) -> dict[str, Any]:
     return dict(finding.causes[0].keys)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_sound_recording_has_no_finding(seed: int) -> None:
     assert log_check(sound(seed)).findings == ()
 
 
+@pytest.mark.extended
 def test_short_lengths_and_a_low_rate_are_alternatives() -> None:
     # In free flight alone, length / time² is all there is: 0.98 = 0.99².
     for wrong in (changed(sound(), position=lambda toss: 0.98 * toss.position), changed(sound(), t=lambda toss: toss.t / 0.99)):
@@ -51,6 +53,7 @@ def test_short_lengths_and_a_low_rate_are_alternatives() -> None:
         assert shares == {"length scale": pytest.approx(-0.02, abs=1.5e-3), "rate": pytest.approx(-0.01, abs=7.5e-4)}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("factor", "unit"), [(1 / 0.0254, "inch"), (1000.0, "mm")])
 def test_another_unit_of_length_is_named(factor: float, unit: str) -> None:
     found = only(log_check(changed(sound(), position=lambda toss: factor * toss.position)))
@@ -62,6 +65,7 @@ def test_another_unit_of_time_is_named() -> None:
     assert (found.kind, cure(found)) == ("unit", {"time_unit": "ms"})
 
 
+@pytest.mark.extended
 def test_another_upward_axis_is_named() -> None:
     lying = changed(
         sound(), position=lambda toss: rotate(ON_SIDE, toss.position), orientation=lambda toss: multiply(ON_SIDE, toss.orientation)
@@ -70,6 +74,7 @@ def test_another_upward_axis_is_named() -> None:
     assert (found.kind, cure(found)) == ("up", {"up": "z"})
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("change", "keys"),
     [
@@ -132,6 +137,7 @@ def test_uneven_times_are_a_finding_unless_the_body_moved_at_these_times() -> No
     assert "jitter" not in kinds(changed(irregular, t=lambda toss: uneven[toss.name], position=moved))
 
 
+@pytest.mark.extended
 def test_a_spin_in_the_body_frame_is_named() -> None:
     with_spin = changed(sound(), angular_velocity=lambda toss: np.zeros((len(toss), 3)))
     check = log_check(with_spin)
@@ -140,6 +146,7 @@ def test_a_spin_in_the_body_frame_is_named() -> None:
     assert cure(only(log_check(given))) == {"spin_frame": "body"}
 
 
+@pytest.mark.extended
 def test_the_shipped_cube_has_short_lengths_and_an_eccentric_mass() -> None:
     # Intervals of an independent evaluation of the same tosses: gravity -9.623 to -9.579 m/s², centre of mass 4.4 to 6.7 mm along z.
     check = log_check(load_log("toss-cube"))

@@ -50,6 +50,7 @@ def of(rows, **given):
     return next(row for row in rows if all(getattr(row, key) == value for key, value in given.items()))
 
 
+@pytest.mark.extended
 def test_same_engine_under_two_names_is_in_one_group_and_a_dead_one_is_not(comparison):
     [mine] = [group for group in comparison.groups["position"] if WANG in group]
     assert WANG.replace("]", ",rotation=midpoint]") in mine

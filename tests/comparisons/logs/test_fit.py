@@ -56,6 +56,7 @@ def test_engine_finds_its_own_friction_and_restitution_from_ten_tosses():
     assert sum(hits) >= 5
 
 
+@pytest.mark.extended
 def test_restitution_transfers_to_the_engine_under_another_name_alone():
     """The impact of another engine needs another coefficient for the same rebounds; and an engine that breaks costs its own row."""
     renamed, breaking = Renamed(OPTIONS), Breaking(OPTIONS)
@@ -93,12 +94,14 @@ def profile(resampled, value):
     return Profile(resampled, resampled, np.full(2, value), 0.0)
 
 
+@pytest.mark.extended
 def test_engine_with_half_of_the_friction_needs_twice_as_much():
     found = estimates(log_fit(tosses(np.random.default_rng(6), 10, WANG, 0.2, 0.4), HalfFriction(OPTIONS), jobs=1))
     assert found["friction"].value == pytest.approx(0.4, abs=0.02)
     assert found["restitution"].value == pytest.approx(0.4, abs=0.02)
 
 
+@pytest.mark.extended
 def test_parameter_without_effect_is_not_identified():
     """MuJoCo's default contacts do not use the restitution; and tosses without a contact in these frames bound neither."""
     fit = log_fit(tosses(np.random.default_rng(7), 8, "mujoco[profile=default]", 0.3, 0.3), "mujoco[profile=default]", jobs=1)

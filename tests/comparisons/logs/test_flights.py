@@ -44,6 +44,7 @@ def test_without_noise_the_parameters_of_the_flights_are_exact() -> None:
         np.testing.assert_allclose(start.state, recording.exact[int(start.toss.name)](start.toss.t[start.frame]), atol=1e-9)
 
 
+@pytest.mark.extended
 def test_a_flight_ends_at_the_last_frame_but_one_before_the_impact() -> None:
     recording = made(2, 12, (2e-4, 2e-3))
     for flight, impact in zip(found(recording.log).found, recording.impacts, strict=True):
@@ -81,6 +82,7 @@ def test_covariance_of_slow_errors_is_that_of_a_twice_integrated_white_noise() -
         assert Noise(0.0, 2.0).covariance(t)[i, j] == pytest.approx(4.0 * expected, rel=1e-14)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("sets", "count", "body"), [(3, 10, BRICK), (2, 30, CUBE)])
 def test_intervals_of_parameters_and_starts_hold(sets: int, count: int, body: dict[str, object]) -> None:
     # 30 starts × 12 components, which depend on each other in pairs: the share inside has a standard deviation of 0.016.
@@ -95,6 +97,7 @@ def test_intervals_of_parameters_and_starts_hold(sets: int, count: int, body: di
     assert 0.90 < np.mean(np.concatenate(starts)) < 0.99
 
 
+@pytest.mark.extended
 def test_a_toss_that_errs_much_more_than_the_others_does_not_move_the_result() -> None:
     recording = made(5, 20, (2e-4, 2e-3), header={"body": CUBE})
     before = found(recording.log)

@@ -30,6 +30,7 @@ def largest(scene, motion):
     return {name: float(np.nan_to_num(getattr(found, name)).max(initial=0.0)) for name in RESIDUALS}
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", ON_FLOOR)
 def test_exact_solution_obeys_the_laws(name):
     """To rounding; an impact within a step has its gap and its slip at most one step away, so that these vanish with it."""

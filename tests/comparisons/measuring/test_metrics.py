@@ -23,6 +23,7 @@ def exact_motion(name, dt=DT, **changes):
     return scene, Trajectory(**{field: changes.get(field, getattr(motion, field)) for field in motion.__dataclass_fields__})
 
 
+@pytest.mark.sample(24)
 @pytest.mark.parametrize("name", [name for name in QUICK if scenarios.load(name).recording is None])
 def test_exact_solution_has_no_error(name):
     """Every metric of the exact solution is 0 to 1e-12 of its scale; metrics of an impact to the speed that one step adds."""
@@ -40,6 +41,7 @@ def test_exact_solution_has_no_error(name):
         assert abs(value) <= allowed, (metric, value)
 
 
+@pytest.mark.extended
 def test_catalogue_uses_every_metric():
     """The test above does not cover a metric that no scene has."""
     used = set()
@@ -48,6 +50,7 @@ def test_catalogue_uses_every_metric():
     assert used == set(METRICS)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("planted", [1e-12, 1e-6, 0.1])
 def test_planted_attitude_error_is_measured(planted):
     """A constant error of attitude after the start is measured as itself, whatever the sign of the quaternion."""
@@ -77,6 +80,7 @@ def components(name, metric, motion):
     return METRICS[metric].average_components([Comparison.with_truth(scene, motion, truth_for(scene))]).parts
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [1e-12, 0.0, 0.0], [0.0, -3e-6, 4e-6], [0.6, 0.8, -2.4], [0.0, 3.1, 0.0]])
 def test_planted_attitude_error_has_its_components(turn):
     """The rotation vector, as scipy has it, whatever the sign of the quaternion."""
@@ -312,6 +316,7 @@ def rebounding(scene, dt, restitution, waits=0.0, stops=0.0):
     return Trajectory.from_states(t, states)
 
 
+@pytest.mark.sample(55)
 @pytest.mark.parametrize("dt", [5e-3, 1e-3])
 @pytest.mark.parametrize("kind", [{}, {"waits": 0.3}, {"stops": 0.2}, {"stops": 2.0}])
 @pytest.mark.parametrize("restitution", [0.3, 0.5, 0.9])

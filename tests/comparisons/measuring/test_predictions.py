@@ -35,6 +35,7 @@ def measured_and_predicted(rows, names, dts):
     return measured.loc[predicted.index], predicted
 
 
+@pytest.mark.extended
 def test_errors_in_flight_are_the_predicted_ones(rows):
     """All errors of `wang`, and of the others where the spin is steady, to a relative 1e-6 or to 1e-9 (measured 2e-10): 250 values."""
     measured, predicted = measured_and_predicted(rows, FREE, [4e-3, 1e-3])

@@ -98,6 +98,7 @@ def test_an_environment_that_cannot_be_made_is_named_and_not_kept(tmp_path, monk
     assert measure([bug], tmp_path, jobs=1, on_done=lambda *one: None)[bug.name][0].state == "not run"
 
 
+@pytest.mark.extended
 def test_a_bug_is_shown_by_the_installed_release(tmp_path):
     """The release that is installed needs no environment."""
     assert version("pybullet") in load_bugs(["pybullet-speed-limit"])[0].releases

@@ -45,6 +45,7 @@ def test_prereleases_are_those_after_the_newest_release(monkeypatch):
     assert environments.prereleases("engine", "1.2.0rc2") == []
 
 
+@pytest.mark.extended
 def test_a_release_of_npm_is_installed_into_its_environment(monkeypatch):
     """There it is found before one in the working folder."""
 

@@ -13,6 +13,7 @@ from dropspin.reports.stories.failures import settings_that_explain
 from dropspin.scenarios import load
 
 
+@pytest.mark.extended
 def test_check_names_the_setting_of_the_adapter_that_changed_its_results(monkeypatch, tmp_path):
     """Of two settings whose calibrated values change, that which moves the rebound; the baseline keeps the accepted values."""
     ball = load("drop-ball").model_copy(update={"duration": 0.8})

@@ -53,6 +53,7 @@ def consistent_with(engine, *scenes, steps=STEPS):
     return sentence if sentence.startswith("Possible cause") else ""
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("title", "engine", "scenes", "size", "words"),
     [
@@ -76,6 +77,7 @@ def tilted(angle):
     return with_gravity(np.array([rotate(turn, axis) for axis in np.eye(3)]).T)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("change", "scenes", "words"),
     [
@@ -114,6 +116,7 @@ def test_missing_gyroscopic_term_is_named():
     assert consistent_with(WithoutGyroscopicTerm(), "spin-asymmetric", "drop-ball") == f"Possible cause of the asymptotic errors: {words}."
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("title", ["spin reported in the body frame", "friction omitted", "angular damping of 1e-3 not switched off"])
 def test_known_fault_is_named(title):
     words = {
@@ -124,6 +127,7 @@ def test_known_fault_is_named(title):
     assert words[title] in consistent_with(TITLED[title], "fall-spin", "spin-asymmetric", "drop-ball-backspin")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "engine",
     [faulty_engine("exact", OF["gyroscopic term"], 0.01), made.engine_with("turned", made.turned_by(0.1)), made.Exact()],
@@ -133,6 +137,7 @@ def test_fault_of_another_kind_has_no_cause(engine):
     assert causes(run(lasting("spin-asymmetric"), engine, STEPS), engine.label) == ([], [])
 
 
+@pytest.mark.extended
 def test_cause_that_another_scene_excludes_is_not_named():
     """An inertia that is wrong in one scene alone: in the other one, which passes, that error would show."""
     wrong = with_body(moments=lambda m: m * np.array([1.01, 1.0, 1.0]))

@@ -89,6 +89,7 @@ def block():
     return scene, accept(run(scene, "mujoco", 2e-3), Baseline(), "first", TODAY)[0]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_corner_whose_contact_depends_on_rounding_does_not_fail(block, seed, monkeypatch):
     """All starts an eps away: rounding decides for all of them whether they touch; measured 1.4 times what one phase may do."""
@@ -128,6 +129,7 @@ def test_changed_scene_fails_once(before, longer_fall, accepted):
     assert failed["reason"].iloc[0] == "the scene has changed since its results were accepted; accept them again"
 
 
+@pytest.mark.extended
 def test_bad_start_does_not_widen_its_own_tolerance(accepted):
     """One start of 32 spreads the starts widely; the tolerance is that of the accepted results."""
     checked = check(run(SCENES[0], OneBadStart(), DTS), accepted)

@@ -92,6 +92,7 @@ def test_results_of_changed_motions_are_no_corrections_beside_those_of_the_same_
     assert not failed[0.008]
 
 
+@pytest.mark.extended
 def test_baseline_without_hashes_is_compared_by_its_versions(accepted, monkeypatch):
     """As written by versions that recorded none: the sentence says so."""
     corrected(monkeypatch)
@@ -110,6 +111,7 @@ def with_version(version):
     return {"candidate": {"drop-ball dt=0.008": {"version": version}}}
 
 
+@pytest.mark.extended
 def test_compare_uses_the_same_motions(earlier, monkeypatch):
     corrected(monkeypatch)
     found = compare(earlier, run(BALL, Candidate(), STEPS))
@@ -117,6 +119,7 @@ def test_compare_uses_the_same_motions(earlier, monkeypatch):
     assert "whose motions are the same bit for bit" in found.attributions["candidate"].message
 
 
+@pytest.mark.extended
 def test_hashes_belong_to_the_acceptance_of_a_result(accepted, tmp_path):
     """A result that is replaced has the hash of its new motions; one that stays has that of the motions from which it was measured."""
     lively = relabelled(run(BALL, TooLively(), STEPS), "too-lively", "candidate")

@@ -253,6 +253,7 @@ class Frozen(Exact):
         return FrozenSimulation(scene)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["drop-ball", "drop-box-flat", "slip-stick"])
 def test_engine_that_never_moves_is_sound_nowhere(name):
     """At any step and height, even where the metrics cannot resolve the motion."""
@@ -309,12 +310,14 @@ FURTHER = {"spin-asymmetric": ["step", "spin", "inertia-ratio"], "drop-ball-live
 """Axes on which the motion of a scene is of another kind than those of the scenes that are scanned on all."""
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["spin-principal", "drop-box-flat"])
 def test_exact_engine_is_sound_everywhere(name):
     """On all axes of a scene, at all values."""
     assert unsound_points(name) == []
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", FURTHER)
 def test_exact_engine_is_sound_where_the_motion_is_of_another_kind(name):
     assert unsound_points(name, FURTHER[name]) == []
@@ -326,6 +329,7 @@ def test_exact_engine_is_sound_on_all_axes_of_the_other_scenes(name):
     assert unsound_points(name) == []
 
 
+@pytest.mark.extended
 @pytest.mark.usefixtures("engine_processes")
 def test_limits_do_not_depend_on_the_number_of_jobs():
     """Also where an engine ends its process."""
@@ -392,6 +396,7 @@ def test_finds_the_blow_up_of_the_explicit_gyroscopic_term(name):
     assert outside == pytest.approx(23.5, rel=0.05)  # measured 23.5 rad/s, .12 rad a step
 
 
+@pytest.mark.extended
 def test_finds_the_faults_of_wang_method():
     """It sinks at restitution 0, gains energy near 1, and never rests in between."""
     sinking = along("rock-block", "duration", "wang")
@@ -406,6 +411,7 @@ def test_finds_the_faults_of_wang_method():
     assert 9.0 <= restless.points[-1].diagnosis.size <= 19.0
 
 
+@pytest.mark.extended
 def test_finds_that_thin_bodies_pass_the_floor():
     """A box of 0.3 m that falls at 4.4 m/s passes it in steps of 68 ms or more, as they fall; at rest, by the length of its last step."""
     assert first(along("drop-box-flat", "step", "mujoco"), "tunnels")[1] == pytest.approx(0.3 / 4.427, rel=0.1)

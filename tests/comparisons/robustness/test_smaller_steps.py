@@ -30,6 +30,7 @@ class Turned(Exact):
         return ExactSimulation(scene, dt, distort)
 
 
+@pytest.mark.extended
 def test_smaller_steps_are_tried_where_the_nominal_one_is_not_sound():
     """The attitude error of a spin of 5 rad/s for 10 s is dt s⁻¹: 0.04 rad at 40 ms; a model error of 0.2 rad stays at any step."""
     scene = SPIN.model_copy(update={"duration": 10.0})

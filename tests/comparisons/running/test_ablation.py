@@ -62,6 +62,7 @@ def test_default_profiles_are_explained():
     assert sum(found.values()) == pytest.approx(1.0, abs=1e-3)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize(
     ("name", "scene_name", "dt"),
     [

@@ -103,6 +103,7 @@ def test_sound_adapter_is_measured_and_leaves_nothing_in_this_process(tmp_path, 
     assert sys.path == path
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("extra", "reason"), RETURNED, ids=range(len(RETURNED)))
 def test_wrong_answers_of_an_adapter_cost_its_own_row(extra, reason, tmp_path, monkeypatch):
     found = run(monkeypatch, tmp_path, extra)
@@ -113,6 +114,7 @@ def test_wrong_answers_of_an_adapter_cost_its_own_row(extra, reason, tmp_path, m
     assert all(verdict in ("passed", "measured") for verdict, _ in judged(found, "wang"))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("extra", "reason"), CONSTRUCTED, ids=range(len(CONSTRUCTED)))
 def test_adapter_that_cannot_be_constructed_is_broken(extra, reason, tmp_path, monkeypatch):
     found = run(monkeypatch, tmp_path, extra)
@@ -142,6 +144,7 @@ def sleepers():
     return found
 
 
+@pytest.mark.extended
 def test_adapter_that_changes_during_a_run_is_not_mixed_with_itself(tmp_path, monkeypatch):
     """It is imported again after it crashed; by then its file is another."""
     extra = "Mine.prepare = lambda self, scene, dt: (open('mine.py', 'a').write('\\nchanged = True'), os._exit(1))"
@@ -152,6 +155,7 @@ def test_adapter_that_changes_during_a_run_is_not_mixed_with_itself(tmp_path, mo
     assert "the code of mine:Mine has changed since the command began" in reasons["again"]
 
 
+@pytest.mark.extended
 def test_code_of_an_adapter_is_that_of_all_modules_it_loads(tmp_path, monkeypatch):
     """Of those that it imports in functions, by relative imports, and by computed names; not of installed ones."""
     package = tmp_path / "pack"

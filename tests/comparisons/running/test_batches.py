@@ -67,6 +67,7 @@ def test_meshes_of_unequal_sizes_are_not_stepped_together():
 BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 
 
+@pytest.mark.extended
 def test_benchmark_of_a_run_prints_its_parts():
     """In a process of its own, because it replaces methods by timed ones."""
     code = "import run_cost; run_cost.run_cost([run_cost.ds.load('fall-spin')])"

@@ -43,6 +43,7 @@ def within(scene: Scenario, label: str) -> list[bool]:
     return [METRICS[name].average(cases).value <= reach[name] for name in ERRORS]
 
 
+@pytest.mark.extended
 def test_engine_that_made_the_tosses_is_within_their_uncertainty_and_with_another_friction_it_is_not():
     scenes = [made(seed, 5) for seed in range(8)]
     inside = np.array([within(scene, log_fits.WANG) for scene in scenes])
@@ -91,6 +92,7 @@ def test_bound_within_the_uncertainty_is_not_decided():
     assert row["reason"].startswith("not decided by the recording (± ")
 
 
+@pytest.mark.extended
 def test_another_friction_fails_the_bound_and_the_baseline(results):
     """As an engine would whose friction is another one in the next version: the baseline compares equal starts, without uncertainty."""
     [scene] = results.scenes.values()

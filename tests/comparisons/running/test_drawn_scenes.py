@@ -67,6 +67,7 @@ def content(scene):
     return scene.model_dump(exclude_none=True, exclude={"origin"})
 
 
+@pytest.mark.extended
 def test_an_exact_engine_raises_no_alarm(drawn):
     results = ds.run(drawn, Exact())
     assert results.exit_code() == 0, results.table[~results.table["verdict"].isin(["passed", "measured"])].to_string()
@@ -75,6 +76,7 @@ def test_an_exact_engine_raises_no_alarm(drawn):
     assert judged.groupby("scene").size().reindex([scene.name for scene in drawn]).min() >= 3
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("change", "families"),
     [

@@ -46,6 +46,7 @@ def test_batch_equals_single_runs_bit_for_bit(name):
         np.testing.assert_array_equal(one.motion.states, other.motion.states)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", ["wang", "wang[rotation=exact]", "mujoco", "mujoco[profile=default]"])
 def test_timed_batch_ends_where_single_runs_end(name):
     """Each member of a batch ends where it ends alone; MuJoCo restarts its solver cold after a stop."""

@@ -71,6 +71,7 @@ def turning(request):
     return run(request.param, [following("cone"), following("integrated-newton")], quick=True)
 
 
+@pytest.mark.sample(1)
 def test_engine_that_follows_another_law_is_recognised_and_still_judged_by_that_of_the_scene(turning):
     """At the other law to 1e-12, at the finest time step; its errors fail, and the distance is no check."""
     other = of_kind(turning, "other_law", "follows-integrated-newton").set_index("truth")
@@ -108,6 +109,7 @@ def pulled(rows, times, dt, truth):
     return rows
 
 
+@pytest.mark.extended
 def test_pull_fails_under_every_law():
     def prepare(self, scene, dt):
         return Sampled(scene, dt, scene, pulled)
@@ -118,6 +120,7 @@ def test_pull_fails_under_every_law():
         assert of_kind(found, "asymptotic_error", "pulled").set_index("metric")["verdict"]["contact_pull"] == "failed"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_solution_passes_under_each_law_of_the_scene(law):
     """Restitutions of Poisson and Stronge are no ratio of speeds, and integrated friction may push along the remaining slip."""
@@ -127,6 +130,7 @@ def test_exact_solution_passes_under_each_law_of_the_scene(law):
     assert set(found.table.loc[found.table["kind"] == "other_law", "truth"]) == {*LAWS} - {law}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("law", LAWS[:2])
 def test_exact_solution_whose_impact_gains_energy_passes(law):
     """As Newton's restitution makes it do at a rough corner (T. R. Kane, 1984): by 18 % of the kinetic energy here."""
@@ -144,6 +148,7 @@ def test_scenes_in_which_the_laws_agree_have_no_distances():
         assert other_laws(load(name)) == {}, name
 
 
+@pytest.mark.extended
 def test_distances_are_in_the_report_the_summary_and_a_stored_run(tmp_path, capsys):
     """Beside the error under the law of the scene; a run that is loaded again has the same rows."""
     found = run("drop-tetra-turning", following("integrated-newton"), 2e-3, quick=True)

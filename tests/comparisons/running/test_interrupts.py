@@ -37,6 +37,7 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.extended
 def test_an_interrupt_while_locks_are_taken_ends_the_work():
     done = subprocess.run([sys.executable, "-c", PLANTED], check=False, capture_output=True, text=True, timeout=60)
     assert done.stdout == "interrupted\n", done.stderr

@@ -62,6 +62,7 @@ class Killed(made.Exact):
         return super().prepare(scene, dt)
 
 
+@pytest.mark.extended
 @pytest.mark.usefixtures("engine_processes")
 def test_engine_that_ends_its_process_costs_its_own_rows_and_is_tried_once(monkeypatch):
     called, call = [], processes.EngineProcesses.call
@@ -101,6 +102,7 @@ class SlowAtFirst(Compiling):
     compiles = False
 
 
+@pytest.mark.extended
 @pytest.mark.usefixtures("engine_processes")
 def test_compilation_is_measured_apart_and_not_limited():
     """It takes longer than the limit, which ends an engine that does not say that it compiles."""

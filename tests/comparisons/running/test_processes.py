@@ -34,6 +34,7 @@ def _compiled():
     ds.simulate(SPIN, "wang", 4e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("what", "verdict", "reason"),
     [
@@ -150,6 +151,7 @@ def test_children_that_an_engine_forks_end_with_it():
     assert not alive
 
 
+@pytest.mark.extended
 def test_processor_time_is_counted_per_piece_of_work():
     """Six pieces of work of .4 s each pass a limit of 1 s, which the system counts in whole seconds."""
 
@@ -166,6 +168,7 @@ def test_processor_time_is_counted_per_piece_of_work():
     assert not found["verdict"].isin(["crashed", "timed_out"]).any()
 
 
+@pytest.mark.extended
 def test_runs_with_broken_engines_leave_no_process_and_no_file():
     """Seven runs in an interpreter of its own, whose children and temporary files are counted."""
     script = textwrap.dedent("""
@@ -199,6 +202,7 @@ def test_runs_with_broken_engines_leave_no_process_and_no_file():
     assert left == []
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_interrupt_and_kill_end_the_engines_too(how):
     """Ctrl-C, or a kill, while an engine loops forever ends the run at once, and the engine's process with it."""

@@ -185,6 +185,7 @@ def test_scene_without_truth_is_measured_by_invariants():
     assert (pairs["value"].abs() < 1e-12).all()  # up to the first contact both fall freely
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize("engine", [made.Frozen(), "wang", "pybullet", "mujoco"])
 @pytest.mark.parametrize(
     "change",
@@ -242,6 +243,7 @@ def test_unsolved_contacts_are_reported():
     assert found.exit_code() == 0
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("scene", "first", "second", "same"),
     [
@@ -268,6 +270,7 @@ def test_agreement_of_one_discretisation_is_no_evidence(scene, first, second, sa
         assert difference < 0.05 * wrong
 
 
+@pytest.mark.extended
 def test_scenes_at_the_limits_of_what_can_be_measured():
     """A fall that ends above the floor; a start with the quaternion's other sign; an exact solution that ends within a few steps."""
     short = BALL.model_copy(update={"duration": 0.3, "expect": ()})

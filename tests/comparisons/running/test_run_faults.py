@@ -56,6 +56,7 @@ FAULTS = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(1)
 @pytest.mark.usefixtures("few_start_phases")
 @pytest.mark.parametrize("fault", FAULTS)
 def test_planted_faults_are_caught(fault):
@@ -149,6 +150,7 @@ def test_malformed_record_is_refused(engine, reason):
     assert "normalised" not in row["reason"]  # no length grows from step to step
 
 
+@pytest.mark.sample(9)
 @pytest.mark.usefixtures("few_start_phases")
 @pytest.mark.parametrize("dt", [4e-3, 2e-3, 1e-3])
 @pytest.mark.parametrize("scene", ["drop-ball", "drop-ball-lively", "drop-box-flat", "drop-box-corner", "drop-box-sticking"])

@@ -68,6 +68,7 @@ def children_of(worker):
     return [stat for stat in stats if stat[1] == str(worker)]
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("workers", [2], indirect=True)
 def test_table_is_the_same_after_a_worker_is_killed(workers, tmp_path):
     """Two workers, one killed when the first part is there: the table of a sweep on this machine, bit for bit."""

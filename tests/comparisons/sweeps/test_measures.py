@@ -36,6 +36,7 @@ def metrics_of_a_run(scene, motion):
     return [*values, rebound, float(motion.t[Motions.of(scene, motion).last_row_in_motion])]
 
 
+@pytest.mark.sample(30)
 @pytest.mark.parametrize("name", SCENES)
 def test_standard_metrics_are_those_of_a_run(name):
     """All scenes, three engines: the same bits, and NaN in the same places."""
@@ -159,6 +160,7 @@ EVERYTHING = [
 ]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("number", range(len(EVERYTHING)))
 def test_job_has_the_same_bits_in_a_batch_and_by_itself(number):
     """Valid or not, with the same reasons."""

@@ -65,6 +65,7 @@ class Breaking(test_engines.Exact):
         return super().prepare(scene, dt)
 
 
+@pytest.mark.extended
 @pytest.mark.usefixtures("engine_processes")
 def test_engine_that_breaks_costs_its_own_rows(tmp_path):
     """A segmentation fault, an endless loop, an exception, NaN: each is reported in its row; the other rows do not change."""
@@ -105,6 +106,7 @@ class Leaking(test_engines.Exact):
         return super().prepare(scene, dt)
 
 
+@pytest.mark.extended
 @pytest.mark.usefixtures("engine_processes")
 def test_leak_is_not_attributed_to_a_job(tmp_path):
     """Sixteen jobs exceed a limit of 1 GB together; none of them does in a process of its own."""
@@ -257,6 +259,7 @@ def processes_of(folder):
     return [path for path in Path("/proc").glob("[0-9]*/cmdline") if str(folder).encode() in path.read_bytes()]
 
 
+@pytest.mark.extended
 def test_killed_sweep_is_resumed_to_the_same_table(tmp_path):
     """SIGKILL at three random moments, resumed each time: the table of one never killed, bit for bit, and no process left behind."""
     spec = write_spec(tmp_path, 60, "drop-ball", ["wang", "mujoco"])

@@ -167,6 +167,7 @@ def test_floor_of_finite_size_is_declined_where_the_body_may_leave_it(label):
     assert engine(label.partition("[")[0]).declines(far) is None
 
 
+@pytest.mark.extended
 def test_calibrated_mujoco_depends_on_a_heavy_body_far_away():
     """Its solver stops at an error relative to the mean inertia of the model, which the heavy body raises."""
     [found] = [one for one in symmetries("drop-box-anyhow", "mujoco", dt=DT) if one.symmetry == "with beside=heavy"]

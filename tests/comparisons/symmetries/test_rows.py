@@ -47,6 +47,7 @@ def test_exact_solution_passes_every_symmetry_and_gives_the_same_bits():
     assert set(rows["kind"]) == {"symmetry", "determinism"}
 
 
+@pytest.mark.extended
 def test_noise_of_one_ulp_fails_the_check_of_repeated_runs():
     rows = rows_of(measured(one_ulp_more(itertools.count())))
     assert rows.loc[AGAIN, "verdict"] == "failed"
@@ -78,6 +79,7 @@ def stored(tmp_path_factory):
     return folder
 
 
+@pytest.mark.extended
 def test_stored_run_has_the_rows_and_its_report_shows_them(stored):
     rows = rows_of(ds.load_results(stored))
     assert {"turned by 1 rad", AGAIN, "with body=child"} <= set(rows.index)
@@ -107,6 +109,7 @@ def test_rounding_has_a_tolerance_of_its_size():
     assert set(rows["verdict"]) == {"passed"}
 
 
+@pytest.mark.extended
 def test_batch_that_breaks_down_costs_its_own_rows():
     def broken(motions):
         if len(motions) == 3:

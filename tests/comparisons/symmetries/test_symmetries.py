@@ -25,6 +25,7 @@ def lost(engine, scene):
     return {name for name, one in statuses(engine, scene).items() if one.status in ("lost", "nearly kept")}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("scene", [*SCENES, "fall-tilted", "spin-damped", "rock-block"])
 def test_exact_solutions_keep_every_symmetry(scene):
     """Each is computed anew for the transformed scene, also with a full inertia tensor, tilted gravity and damping."""
@@ -48,6 +49,7 @@ def test_transformed_scene_is_another_and_has_the_same_solution(name):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8 if "km" in name else 1e-10)
 
 
+@pytest.mark.extended
 def test_document_keeps_every_symmetry_of_every_scene_that_it_runs():
     """What the note gets wrong is wrong alike in every direction, at every place and in all units."""
     found = symmetries(engines="wang", dt=2e-3)
@@ -55,6 +57,7 @@ def test_document_keeps_every_symmetry_of_every_scene_that_it_runs():
     assert {one.status for one in found if one.scene in ("spin-asymmetric", "drop-box-anyhow", "drop-box-sticking")} == {"kept"}
 
 
+@pytest.mark.extended
 def test_findings_do_not_depend_on_the_number_of_jobs():
     one, two = (symmetries(["fall-tilted", "spin-principal"], [made.Exact(), "wang"], dt=DT, jobs=jobs) for jobs in (1, 2))
     assert repr(one) == repr(two)
@@ -129,6 +132,7 @@ def test_friction_along_axes_is_found_by_turning_by_an_angle_that_no_grid_has():
     assert not {"turned by 90°", "mirrored", "other body axes", "10 m away", AGAIN} & found
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("unit", "distort"),
     [
@@ -166,6 +170,7 @@ def test_threshold_of_mass_is_found():
     assert lost(Heavy(), "fall-spin") == {"in grams"}
 
 
+@pytest.mark.extended
 def test_noise_of_one_ulp_is_found_with_its_first_step():
     """In each new simulation another number has it, after half of the scene."""
     ulps = itertools.count()
@@ -193,6 +198,7 @@ def test_batch_with_other_results_is_found():
     assert lost(made.in_batches("pushed", pushed), "fall-spin") == {BATCH, *([ONE_CORE] if len(os.sched_getaffinity(0)) > 1 else [])}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("scene", ["drop-ball", "fall-spin", "turn-box-flat"])
 def test_batch_that_swaps_two_members_is_found(scene):
     """Also of a body that starts at rest, and where their differences have opposite signs."""
@@ -204,6 +210,7 @@ def test_batch_that_swaps_two_members_is_found(scene):
     assert lost(made.in_batches("swapped", swapped), scene) == {BATCH, *([ONE_CORE] if len(os.sched_getaffinity(0)) > 1 else [])}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("scene", ["fall-spin", "spin-asymmetric", "drop-ball", "spin-damped"])
 def test_batch_that_steps_all_scenes_with_the_numbers_of_the_first_is_found(scene):
     """Of an engine that says that it mixes scenes."""

@@ -6,6 +6,7 @@ import pytest
 from support.cli import dropspin
 
 
+@pytest.mark.extended
 def test_settings_and_texts_to_paste(tmp_path, monkeypatch):
     """The table, the settings and the texts; one text alone; everything as JSON."""
     monkeypatch.setattr("dropspin.comparisons.calibration.LARGEST_STEP", 0.01)  # the search for the largest stable step takes seconds

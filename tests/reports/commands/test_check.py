@@ -22,6 +22,7 @@ BASELINE = ("--baseline", "dropspin-baseline.toml")
 pytestmark = pytest.mark.usefixtures("all_start_phases")  # results are compared with those of `repository`
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("release", ["good", "failing", "crashing"])
 def test_check_judges_a_run_and_writes_junit_and_a_summary(release, repository, exit_codes, junit_schema, tmp_path):
     """Exit code, JUnit that CI servers read, a summary, and every failure with its command."""
@@ -68,6 +69,7 @@ def test_check_reads_by_default_the_baseline_that_accept_writes_by_default(repos
     assert (left_out.returncode, left_out.stdout) == (without.returncode, without.stdout)
 
 
+@pytest.mark.extended
 def test_run_that_the_default_baseline_does_not_cover_is_refused_with_the_remedy(repository, tmp_path):
     for extra, reason in ((), "none of the "), (("--quick",), "a quick run has too few starts"):
         dropspin("run", "fall-spin", "-e", "wang", "--dt", "0.01", *extra, "-o", tmp_path / "run", cwd=repository)
@@ -80,6 +82,7 @@ def test_run_that_the_default_baseline_does_not_cover_is_refused_with_the_remedy
     assert (both.returncode, "give only one of them" in both.stderr) == (2, True)
 
 
+@pytest.mark.extended
 def test_the_command_that_reproduces_a_failure_measures_the_same_value(repository, tmp_path):
     """It is one command and ends as the check did."""
     checked = dropspin("check", "out/failing", *BASELINE, "--json", "--junit", tmp_path / "j.xml", cwd=repository)
@@ -99,6 +102,7 @@ def test_the_command_that_reproduces_a_failure_measures_the_same_value(repositor
     assert (again["value"], again["verdict"]) == (row["value"], "failed")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("release", "code", "verdict"), [("good", 0, "accepted results hold."), ("failing", 1, "accepted results fail.")])
 def test_a_run_is_checked_at_once_with_a_baseline(release, code, verdict, repository, tmp_path):
     """With the same words and the same exit code as a check; here of one of the accepted time steps."""
@@ -137,6 +141,7 @@ def test_a_crash_cannot_be_accepted(repository, tmp_path):
     assert not (tmp_path / "none.toml").exists()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("fault", ["raise RuntimeError('no')", "import no_such_library"], ids=["broken", "missing"])
 def test_summary_counts_an_engine_that_could_not_be_used(fault, tmp_path):
     (tmp_path / "my_engine.py").write_text(fault)

@@ -62,6 +62,7 @@ def assert_outcome(release, folder, done, exit_codes, junit_schema):
     return summary.read_text()
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("release", ["failing", *(pytest.param(release, marks=pytest.mark.slow) for release in ("good", "crashing"))])
 def test_action_judges_an_engine_and_names_the_cause_of_a_regression(release, repository, exit_codes, junit_schema, tmp_path):
     """With one scene, and what is installed here."""

@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 
+import pytest
 from support.cli import dropspin
 
 GATE = Path(__file__).parents[3] / "docs" / "gate.md"
@@ -40,6 +41,7 @@ def test_history_finds_the_run_in_which_results_moved(repository, tmp_path):
     assert "![drop-ball](drop-ball.svg)" in (tmp_path / "history/history.md").read_text().splitlines()
 
 
+@pytest.mark.extended
 def test_the_python_of_the_documentation_runs(tmp_path, monkeypatch):
     """In an empty folder: it writes a baseline into the working directory."""
     monkeypatch.chdir(tmp_path)

@@ -15,6 +15,7 @@ from dropspin.comparisons.conformance.checks import CHECKS, conform
 ADAPTER = (Path(__file__).parents[3] / "docs" / "bring-your-engine.md").read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
 
 
+@pytest.mark.extended
 def test_the_adapter_of_the_documentation_conforms_and_runs(tmp_path):
     """A module in the working directory; its results bear its name, and what it prints is not in the output."""
     (tmp_path / "my_module.py").write_text(f"print('hello')\n{ADAPTER}")
@@ -26,6 +27,7 @@ def test_the_adapter_of_the_documentation_conforms_and_runs(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} - {"__pycache__"} == {"my_module.py", "out"}
 
 
+@pytest.mark.extended
 def test_files_of_the_user_hide_no_module_of_dropspin(tmp_path):
     """In a fresh process, in whose working directory a file has the name of a package of dropspin."""
     (tmp_path / "my_module.py").write_text(f"print('hello')\n{ADAPTER}\nclass Mine:\n    Flyer = Flyer\n")
@@ -147,6 +149,7 @@ def test_rows_fit_a_terminal_of_80_columns(raising):
 ENGINE = "from dropspin import Engine\nclass Mine(Engine):"
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize(
     ("text", "code", "message"),
     [
@@ -185,6 +188,7 @@ def test_a_missing_required_member_is_named(member, tmp_path):
     assert line.endswith(end)
 
 
+@pytest.mark.extended
 def test_an_engine_of_another_package(tmp_path):
     """One that is installed with an entry point is listed, and runs by its name; no package can take a name of dropspin's own engines."""
     (tmp_path / "my_module.py").write_text(ADAPTER)

@@ -199,6 +199,7 @@ FORGED = {
 }
 
 
+@pytest.mark.sample(31)
 @pytest.mark.parametrize(("damage", "named"), (RAW | FORGED).values(), ids=(RAW | FORGED).keys())
 def test_damaged_run_is_refused_in_one_line(damage, named, copied, tmp_path):
     damage(copied)
@@ -235,6 +236,7 @@ def test_pipe_in_a_run_is_refused(name, copied, tmp_path):
     assert_refused(dropspin("report", "run", cwd=tmp_path), "not a regular file")
 
 
+@pytest.mark.extended
 def test_flipped_bits_are_told_or_change_nothing(small, tmp_path):
     """Each of 100 random bits in a folder: the run is refused with the name of the file, or is what it was."""
     rng = random.Random(20)

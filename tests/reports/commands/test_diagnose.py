@@ -100,6 +100,7 @@ def test_mesh_is_a_solid_of_a_density(tmp_path):
     assert sorted(moments) == pytest.approx([0.0125, 0.025, 0.0325], rel=1e-4)
 
 
+@pytest.mark.extended
 def test_urdf_that_one_engine_refuses_is_diagnosed_in_the_other(tmp_path):
     pytest.importorskip("pybullet", exc_type=ImportError)
     text = (DOCS / "diagnose/brick.urdf").read_text(encoding="utf-8")

@@ -81,6 +81,7 @@ CASES = [
 ]
 
 
+@pytest.mark.sample(30)
 @pytest.mark.parametrize(("arguments", "message"), CASES, ids=range(len(CASES)))
 def test_input_that_nobody_means_is_refused_in_one_message(arguments, message, tmp_path):
     """Who reads a pipe or a device waits forever, which ends a process of its own."""

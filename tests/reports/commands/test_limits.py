@@ -28,6 +28,7 @@ def test_a_scan_is_printed_and_written(tmp_path):
     assert {row["failure_mode"] for row in json.loads(masses.stdout)} == {"sound", "declined"}
 
 
+@pytest.mark.extended
 def test_engine_that_is_not_accurate_at_the_nominal_step_is_tried_at_smaller_ones(tmp_path):
     """MuJoCo's explicit gyroscopic term at 5 ms, and a tolerance that none of the smaller steps meets; every step tried is in the files."""
     asked = ("limits", "spin-asymmetric", "-e", "mujoco", "--axis", "mass", "-o", "out")

@@ -43,6 +43,7 @@ def cube(tmp_path_factory):
     return folder, done.stdout
 
 
+@pytest.mark.extended
 def test_sound_recording_has_values_and_no_finding(recording):
     done = dropspin("log", "check", "toss.toml", cwd=recording, **TERMINAL)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -60,6 +61,7 @@ def test_sound_recording_has_values_and_no_finding(recording):
     assert CheckedLog.model_validate_json((folder / "section.json").read_text()).findings == []
 
 
+@pytest.mark.extended
 def test_finding_is_printed_with_alternatives_and_remedy_and_is_exit_code_1(recording):
     done = dropspin("log", "check", "short.toml", "-o", "out", cwd=recording)
     assert done.returncode == 1
@@ -71,6 +73,7 @@ def test_finding_is_printed_with_alternatives_and_remedy_and_is_exit_code_1(reco
     assert [row["kind"] for row in data if row["row"] == "findings"] == ["scale"]
 
 
+@pytest.mark.extended
 def test_scene_of_each_toss_continues_it(cube):
     folder, _ = cube
     files = sorted((folder / "out" / "scenes").glob("*.toml"))
@@ -105,6 +108,7 @@ def test_page_shows_what_is_printed_of_the_shipped_tosses(cube):
     assert [part for part in shown.split("…\n") if " ".join(part.split()) not in printed] == []
 
 
+@pytest.mark.extended
 def test_fit_and_comparison_write_pages_and_name_what_to_correct(recording):
     """With lengths that a header calls 2 % long, which they are not, gravity is too small."""
     header = tomlkit.parse((recording / "short.toml").read_text()) | {"floor": {"restitution": 0.3, "friction": 0.3}}
@@ -135,6 +139,7 @@ def test_help_of_log_lists_its_commands(tmp_path):
     assert (alone.returncode, alone.stderr) == (2, helped.stdout)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -41,6 +41,7 @@ reason = "no engine is that stiff"
 """
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("arguments", "code", "output", "error"),
     [
@@ -156,6 +157,7 @@ def test_version_says_what_to_cite(tmp_path):
     assert max(map(len, lines.splitlines())) <= 80
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])
 def test_terminals_without_utf_8(encoding, tmp_path, monkeypatch):
     """A question mark in place of a character that the terminal lacks; no traceback and no other exit code."""

@@ -8,6 +8,7 @@ from dropspin import pytest_plugin
 pytest_plugins = ["pytester"]
 
 
+@pytest.mark.extended
 def test_written_adapter_passes_the_written_tests(pytester, monkeypatch):
     """They check conformance and that errors vanish as dt → 0, also in another folder and under a name with several words."""
     done = dropspin("new-adapter", "wobbly_Top2", "-o", "deep/er", cwd=pytester.path)

@@ -166,6 +166,7 @@ def whole(shared):
     return shared("whole-run", make) / "whole"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.usefixtures("engine_processes", "all_start_phases")
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_an_interrupted_run_is_resumed(how, whole, tmp_path):

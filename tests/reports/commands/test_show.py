@@ -21,6 +21,7 @@ def test_list_prints_the_same_as_a_table_and_as_json(what, tmp_path):
         assert dropspin("list", cwd=tmp_path).stdout == table.stdout
 
 
+@pytest.mark.extended
 def test_listed_exact_solutions_are_those_of_truth_for(tmp_path):
     """The list reads them from scenarios/problems.toml, where a new scene of the catalogue has a line."""
     truths = {name: reference_for(load(name)) for name in names()}

@@ -26,6 +26,7 @@ from dropspin.scenarios import DropspinError, load
 DEEP = "[" * 5000 + "]" * 5000
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["../../stray", "/tmp/dropspin-stray", "..", "a/b", "x" * 300, "<img src=x onerror=alert(1)>"])
 def test_history_writes_only_into_its_folder(name, small, tmp_path):
     """A scene's name is no path; every picture has its place, and the page names it."""
@@ -42,6 +43,7 @@ def test_history_writes_only_into_its_folder(name, small, tmp_path):
     assert "<img" not in page.replace("\\<", "")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("verb", [("compare", "good", "run"), ("compare", "history", "good", "run", "-o", "out")])
 def test_settings_are_printed_without_control_characters(verb, small_folder, copied, tmp_path):
     """They are what an engine's adapter reported: their names and values may be of any characters."""
@@ -120,6 +122,7 @@ def test_study_of_anything_else_is_refused(content, copied, tmp_path):
     assert contents(tmp_path) == before
 
 
+@pytest.mark.extended
 def test_names_of_runs_are_printed_without_control_characters(small_folder, tmp_path):
     """The name of a folder may be of any characters, and be no text."""
     for name in (b"one\x1b[2J", b"two\xff"):
@@ -253,6 +256,7 @@ def test_damaged_baseline_is_refused(content, copied, tmp_path):
     assert_refused(done, "b.toml")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("value", "tolerance"), [("1e308", "5e-324"), ("1e308", "1e308"), ("5e-324", "1e308")])
 @pytest.mark.parametrize("engine", ["mujoco", "other"])
 def test_extreme_numbers_of_a_baseline_are_compared_and_kept(engine, value, tolerance, copied, tmp_path):

@@ -54,6 +54,7 @@ def full_device():
         yield stream
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", MEASURING)
 def test_closed_pipe_loses_no_file_and_keeps_the_exit_code(name, scenes, closed_pipe):
     """As in `dropspin run | head -1`."""
@@ -71,6 +72,7 @@ def test_exit_code_of_a_failed_check_is_that_with_a_closed_pipe_and_on_a_full_de
         assert dropspin("check", "out", cwd=scenes, stdout=stream).returncode == 1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("arguments", [["list"], ["list", "--json"], ["show", "drop-ball"], ["--help"], ["run", "--help"]], ids=" ".join)
 def test_closed_pipe_is_quiet_in_a_process_of_its_own(arguments):
     process = subprocess.Popen([DROPSPIN, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -99,6 +101,7 @@ def test_full_device_for_errors_changes_no_exit_code(arguments, code, scenes, fu
     assert dropspin(*arguments, cwd=scenes, stderr=full_device).returncode == code
 
 
+@pytest.mark.extended
 def test_full_device_for_the_output_is_said_and_loses_no_file(scenes):
     """In a process of its own, because Python writes what is left once more when it ends."""
     command = [DROPSPIN, *MEASURING["run"][0], "-o", "out", "--json"]

@@ -37,6 +37,7 @@ def strays(tmp_path):
     return tmp_path
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("arguments", [("doctor",), RUN], ids=lambda given: given[0])
 def test_strays_in_the_working_directory_are_not_imported(arguments, strays):
     done = spawn(*arguments, cwd=strays)
@@ -44,6 +45,7 @@ def test_strays_in_the_working_directory_are_not_imported(arguments, strays):
     assert not list(strays.glob("imported-*"))
 
 
+@pytest.mark.extended
 def test_plots_ignore_settings_of_the_working_directory_and_the_backend_of_a_notebook(strays):
     """Also one that is not installed."""
     elsewhere = strays / "elsewhere"
@@ -126,6 +128,7 @@ def test_sweep_is_not_resumed_with_another_adapter(tmp_path):
     assert "holds a sweep that was run with the adapter of mine " in done.stderr
 
 
+@pytest.mark.extended
 def test_run_is_resumed_with_scenes_of_the_same_adapter_only(tmp_path):
     """A changed one is measured again, which is said."""
     texts = {"drifting.py": ADAPTER, "helper_of_drifting.py": "x = 1", "ball.toml": BALL}

@@ -92,6 +92,7 @@ def test_worlds_that_are_no_whole_numbers_are_refused(worlds, tmp_path):
     assert "is not a list of whole numbers above 0, such as 1,256,4096" in " ".join(refused.stderr.split())
 
 
+@pytest.mark.extended
 def test_each_number_of_worlds_has_a_cost_and_a_recommendation(tmp_path):
     """And there is a plot of the throughput; an engine without batches has no cost per world."""
     (tmp_path / "short.toml").write_text(SCENE)

@@ -47,6 +47,7 @@ def contents(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(
     ("option", "message"),
     [
@@ -73,6 +74,7 @@ def test_pipes_are_neither_replaced_nor_waited_for(option, message, outputs):
     assert (outputs / "pipe.gif").is_fifo()
 
 
+@pytest.mark.extended
 def test_a_pipe_that_is_read_takes_a_summary(outputs):
     done = subprocess.run(
         [DROPSPIN, "check", "run", "--summary", "/dev/stdout"], cwd=outputs, capture_output=True, text=True, check=False, timeout=60
@@ -112,6 +114,7 @@ def test_full_disk_says_that_a_sweep_can_be_resumed(outputs):
     assert dropspin("sweep", "spec.toml", "-o", "new", "--resume", cwd=outputs).returncode == 0
 
 
+@pytest.mark.sample(2)
 @pytest.mark.usefixtures("engine_processes", "all_start_phases")
 @pytest.mark.parametrize(("command", "kind"), LONG, ids=[command[0] for command, _ in LONG])
 def test_interrupted_commands_leave_the_old_output(command, kind, outputs):
@@ -126,6 +129,7 @@ def test_interrupted_commands_leave_the_old_output(command, kind, outputs):
     assert contents(outputs) == before
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("command", "size", "message"), FULL, ids=[" ".join(command[:4]) for command, _, _ in FULL])
 def test_full_disks_leave_the_old_output(command, size, message, outputs):
     """What a run has measured may stay for --resume."""

@@ -30,6 +30,7 @@ def explained(core):
     return explanations(core, core.statuses())
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("scene", "engine", "verdict", "reason", "words"),
     [
@@ -100,6 +101,7 @@ def test_undecided_trends_of_the_conclusion_are_the_marks_of_the_matrix(core, su
         assert all(scene in named for scene in scenes) or named == f"{len(scenes)} scenes"
 
 
+@pytest.mark.extended
 def test_failure_is_the_status_of_its_scene():
     results = ds.run("spin-principal", made.engine_with("drifting", made.turned_by(0.1)))
     assert overview(results).statuses["spin-principal"]["drifting"] == ("failed", "")

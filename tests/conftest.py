@@ -165,18 +165,18 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[
 
 @pytest.fixture(scope="session")
 def core_run(shared) -> Path:
-    """The folder of a run of the quick catalogue with the three engines at the default time steps, data only; `load_results` reads it."""
+    """The folder of a run of the core catalogue with the three engines at the default time steps, data only; `load_results` reads it."""
 
     def make(folder: Path) -> None:
         from support.brief_runs import few_starts, whole_timings
-        from support.engines import QUICK
+        from support.engines import CORE
         from support.scenes import with_few_members
 
         from dropspin.comparisons.results.store import save
         from dropspin.comparisons.running.run import run
 
         with few_starts(), whole_timings():
-            results = run(map(with_few_members, QUICK), ["wang", "mujoco", "pybullet"])
+            results = run(map(with_few_members, CORE), ["wang", "mujoco", "pybullet"])
         save(results, folder, compress=False)
 
     return shared("core-run", make)

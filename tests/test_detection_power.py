@@ -29,7 +29,7 @@ def test_a_parameter_wrong_by_three_per_mille_is_detected(title, name, scene):
     assert failures(name, FAULT[title], 3e-3, scene)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("title", "name", "s", "scene", "metric"),
     [
@@ -54,10 +54,12 @@ def test_a_fault_of_size_zero_changes_no_bit(name):
         np.testing.assert_array_equal(found.states[1:], expected.states[1:])
 
 
+@pytest.mark.extended
 def test_an_engine_with_a_fault_of_size_zero_fails_nothing():
     assert failures("mujoco", FAULT["gravity"], 0.0, "tip-box") == set()
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("name", [SEQUENTIAL, "mujoco", "pybullet"])
 def test_a_gyroscopic_fault_changes_the_motion_as_much_as_in_the_exact_engine(name):
     """The exact engine with the fault integrates Euler's equations to 1e-12; a real one gets a torque in addition to its own."""

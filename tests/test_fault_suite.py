@@ -57,10 +57,11 @@ FRICTION = {
 @pytest.mark.usefixtures("few_start_phases")
 @pytest.mark.parametrize(("title", "scene"), (SUBTLE | HARD_CODED | OTHER_KINDS | STEPS_AND_IMPACTS | FRICTION).items())
 def test_planted_fault_is_detected_in_one_scene(title, scene):
-    """At the default time steps: a changed scene, changed states, changes at impacts and a wrong claim; an engine that crashes tests nothing."""
+    """At the default time steps: changed scenes, states and impacts, and a wrong claim; an engine that crashes tests nothing."""
     assert {check for _, check in failed_checks(NUMBERS[title], [scene])} - {"crashed"}
 
 
+@pytest.mark.extended
 def test_correct_engine_passes_in_some_scenes():
     assert (
         failed_checks(

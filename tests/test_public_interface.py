@@ -67,6 +67,7 @@ def table_of(html):
     return pd.DataFrame([row[1:] for row in rows], index=[row[0] for row in rows], columns=header[1:])
 
 
+@pytest.mark.extended
 def test_notebook_shows_status_and_leading_error_of_each_engine():
     """Scenes by engines; also of a scene without an exact solution, an engine that declines it, and names with markup."""
     named = ds.load(FALL | {"name": "<b>fall</b>"})

@@ -78,6 +78,7 @@ def test_marked_test_is_called_for_each_engine(repository):
     assert "faulty" in (repository.path / "dropspin-baseline.toml").read_text(encoding="utf-8")
 
 
+@pytest.mark.extended
 def test_collecting_runs_no_scene(repository):
     """The engines of the configuration file; tests are selected by path, by -k and by -m."""
     repository.makeini("[pytest]\ndropspin_engines = engines:Mine\n    engines:Shy")
@@ -215,6 +216,7 @@ def test_result_worse_than_accepted_fails(repository):
     )
 
 
+@pytest.mark.extended
 @pytest.mark.usefixtures("baseline")
 def test_scene_without_accepted_results_is_judged_by_its_expectations(repository):
     """The summary says that no results were compared with the baseline."""

@@ -75,7 +75,7 @@ WAYS = {"pytest": [DROPSPIN.with_name("pytest")], "python -m pytest": [sys.execu
 QUICK = {("pytest", ""), ("python -m pytest", "."), ("dropspin", ".")}
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("command", "path"),
     [pytest.param(*way, marks=[] if way in QUICK else pytest.mark.slow) for way in product(WAYS, ["", "."])],

@@ -55,6 +55,7 @@ def test_pasted_program_has_the_measured_restitution(name, e, dt, capsys):
     assert got == pytest.approx(value(found, "restitution"), abs=2e-4)
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["mujoco", "pybullet"])
 def test_pasted_program_needs_the_engine_alone(name, tmp_path):
     """In an interpreter of its own; it leaves no file."""
@@ -65,6 +66,7 @@ def test_pasted_program_needs_the_engine_alone(name, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["pasted.py"]
 
 
+@pytest.mark.extended
 @pytest.mark.usefixtures("without_step_search")
 @pytest.mark.parametrize("name", ["mujoco", "pybullet"])
 def test_calibration_of_a_box_with_friction(name):
@@ -144,7 +146,7 @@ def test_urdf_moves_as_the_body_of_the_program(shape, tmp_path):
     np.testing.assert_allclose(moments[0], moments[1], rtol=1e-12)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("e", [0.3, pytest.param(0.5, marks=pytest.mark.slow), pytest.param(0.8, marks=pytest.mark.slow), 0.95])
 def test_damper_holds_for_its_step_only(e):
     """v+ = v (1 - b h): at another step h than dt, e becomes (1 + e) h/dt - 1; at least 0, and 1 at the largest stable step."""
@@ -154,7 +156,7 @@ def test_damper_holds_for_its_step_only(e):
     assert value(found, "penetration") == pytest.approx(math.sqrt(2 * 9.81) * 2e-3 * 63.5 / 64, rel=0.02)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.usefixtures("without_step_search")
 @pytest.mark.parametrize("e", [0.3, pytest.param(0.5, marks=pytest.mark.slow), pytest.param(0.8, marks=pytest.mark.slow), 0.95])
 def test_restitution_of_bullet_does_not_depend_on_the_step(e):

@@ -199,6 +199,7 @@ def test_recommended_step_has_the_stated_error(spin):
         assert abs(measure(spin.scene, finer)["orientation_error"]) <= within
 
 
+@pytest.mark.extended
 def test_errors_fall_by_their_order(spin):
     """Midpoint by 4 and rk4 by 16 per halved step, to a tenth of the order, where neither coarse steps nor rounding dominate."""
     for engine, order in (("wang[rotation=midpoint]", 2.0), ("wang[rotation=rk4]", 4.0)):
@@ -217,6 +218,7 @@ def test_engine_that_does_not_converge_is_left_out(spin):
     assert min(point.error for point in spin.points if "exact" in point.engine) < 1e-13
 
 
+@pytest.mark.extended
 def test_engine_that_conserves_the_energy_of_a_wrong_motion_is_left_out():
     """Wang's method keeps the energy of a spin that it gets wrong; midpoint keeps that of the right one."""
     short = SPIN.model_copy(update={"duration": 10.0})

@@ -284,6 +284,7 @@ def test_unwritable_cache_is_no_error(short, fall):
     assert fall(short, SHORT_FALL, NUMBA_CACHE_DIR=str(short / "a-file")) == ["-1.0", "0", "True"]
 
 
+@pytest.mark.extended
 def test_full_disk_is_no_error(short, fall):
     """The index has room, and the kernel has not; all modules are imported before."""
     full = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"

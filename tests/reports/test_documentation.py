@@ -122,6 +122,7 @@ def test_python_of_the_readme_and_of_the_replay_page_runs(tmp_path, monkeypatch)
     assert (tmp_path / "corner.gif").exists()
 
 
+@pytest.mark.extended
 def test_python_of_the_reference_prints_what_the_page_shows(capsys):
     text = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
     [(block, printed)] = re.findall(r"^```python\n(.*?)^```\n\nIt prints:\n\n```text\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)

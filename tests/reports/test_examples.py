@@ -57,7 +57,7 @@ def part(results, scene, engines, dts):
     return replace(results, **tables, scenes=chosen, engines=tuple(engines), trajectories=kept[0], ensembles=kept[1])
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.usefixtures("_shared_runs", "two_rounds")
 @pytest.mark.parametrize("name", PAGES)
 def test_every_block_runs_and_draws(drawer, name):

@@ -48,6 +48,7 @@ def test_catalogue_has_the_scene_with_a_rounded_mesh():
     assert sorted(map(tuple, known.body.faces)) == sorted(map(tuple, scene.body.faces))
 
 
+@pytest.mark.extended
 def test_row_of_the_page_is_that_of_the_program(monkeypatch):
     """With 29,402 vertices, the most of the page."""
     monkeypatch.setattr(laboratory, "CELLS", (70,))

@@ -314,6 +314,7 @@ def test_single_chart_has_labels_at_the_ends_of_lines_where_they_fit(lines_of):
         assert len(figure.legends) == 1
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(("size", "inches"), [("column", 3.4), ("page", 7.0)])
 def test_legend_is_within_the_figure(lines_of, size, inches):
     """Also if labels are long; one panel of rows, as of a study of limits, and several."""

@@ -25,6 +25,7 @@ def page():
     return without_rounding(PAGE.read_text(encoding="utf-8").partition(START)[2].partition(END)[0])
 
 
+@pytest.mark.extended
 def test_sections_of_the_page_are_what_the_command_writes():
     printed = sections(page())
     without_data = [source.name for source in sources()]

@@ -274,6 +274,7 @@ def test_interrupted_gif_leaves_the_old_one(results, tmp_path):
     assert [one.name for one in tmp_path.iterdir()] == ["clip.gif"]
 
 
+@pytest.mark.extended
 def test_report_command_keeps_the_replay(folder, tmp_path):
     copied = shutil.copytree(folder, tmp_path / "run")
     (copied / "replay.html").write_text("a replay")
@@ -305,6 +306,7 @@ def test_damaged_run_is_refused(folder, tmp_path, damage):
         assert_refused(dropspin(verb, copied, cwd=tmp_path), "not the folder of a run, or damaged")
 
 
+@pytest.mark.extended
 def test_planes_of_a_scene_are_drawn_and_impulses_are_those_of_all():
     surface = {"restitution": 0.8, "friction": "none"}
     wall = surface | {"point": [1.0, 0.0, 0.0], "normal": [-0.6, 0.0, 0.8]}

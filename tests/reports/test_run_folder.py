@@ -180,6 +180,7 @@ def test_a_loaded_run_equals_the_one_that_was_saved(results, folder):
     assert list(csv.columns) == list(results.table.columns)
 
 
+@pytest.mark.extended
 def test_a_run_of_the_earlier_format_is_read(tmp_path):
     """Format 5 had no column for the basis of a verdict, which was the beginning of its reason, and another name for the engine `wang`."""
     folder = write_report(run("spin-asymmetric", ["wang[rotation=rk4]", "wang"], [8e-3, 4e-3]), tmp_path / "run").parent
@@ -220,6 +221,7 @@ def test_run_json_holds_the_provenance(folder):
     assert stamped["settings"]["mujoco"]["drop-ball dt=0.004"]["solref"] == [0.0, -1.5 / 4e-3]
 
 
+@pytest.mark.extended
 def test_a_run_replaces_an_earlier_run_and_nothing_else(small, tmp_path):
     """A run replaces a run; a folder of something else, or a file, is refused and stays whole."""
     target = tmp_path / "run"
@@ -298,6 +300,7 @@ def test_a_link_leads_to_the_folder_that_is_replaced(small, tmp_path):
         assert (tmp_path / f"{name}-run" / "report.html").is_file()
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("failing", [1, 2])
 def test_a_swap_that_fails_brings_the_old_run_back(small, tmp_path, monkeypatch, failing):
     """Whichever of the two renames does not work, the old run is there afterwards and nothing else is."""
@@ -445,6 +448,7 @@ def test_setting_errors_are_compared_with_the_calibrated_profile():
     assert profile_comparisons(run("drop-ball", "pybullet[profile=default]", 1e-2)) == []
 
 
+@pytest.mark.extended
 def test_a_run_of_many_scenes_has_plots_of_those_that_fail(results, monkeypatch):
     """The first of these; the page says of how many."""
     last = list(results.scenes)[-1]

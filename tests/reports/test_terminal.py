@@ -66,6 +66,7 @@ def test_summary_of_many_scenes_shows_those_with_findings_and_counts_the_others(
     assert not {name.rpartition("-")[0] for name in shown} & set(without)
 
 
+@pytest.mark.extended
 def test_cells_have_status_and_leading_error(core, capsys):
     """The mark is that of the one status; the number is in the results."""
     lines = {line.split()[0]: line for line in printed(core, capsys)}
@@ -78,6 +79,7 @@ def test_cells_have_status_and_leading_error(core, capsys):
     assert lines["slide-box"].split()[:7] == ["slide-box", "position,", "%", "of", "0.47", "m", "–"]
 
 
+@pytest.mark.extended
 def test_row_shows_the_metric_of_the_largest_known_error(core, capsys):
     """Not the leading metric, in which the engine of the known error may be almost right."""
     line = next(line for line in printed(core, capsys) if line.startswith("drop-box-corner "))
@@ -100,7 +102,7 @@ def test_failing_scene_stays_when_others_are_left_out(core, capsys):
     assert sum(line.startswith("Reproduce: dropspin run ") for line in lines) == 1
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("width", [60, 80, 160])
 def test_matrix_of_many_engines_leaves_out_engines_before_it_breaks_a_number(core, capsys, width):
     """It names those that are left out."""
@@ -116,6 +118,7 @@ def test_matrix_of_many_engines_leaves_out_engines_before_it_breaks_a_number(cor
     assert ("Columns not shown at this width: pybullet[coordinates=multibody]" in text) == (width <= 80)
 
 
+@pytest.mark.extended
 def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
     sentences = overview(core).findings
     of = {engine: [one for one in sentences if one.startswith(f"{human_label(engine)}: ")] for engine in core.engines}

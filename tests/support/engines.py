@@ -8,6 +8,7 @@ from dropspin.scenarios.rotations import multiply
 
 SLOW = tuple(name for name in names() if "slow" in load(name).tags)
 QUICK = tuple(name for name in names() if name not in SLOW)
+CORE = tuple(name for name in names() if "core" in load(name).tags)
 
 
 class ExactSimulation(Simulation):

@@ -64,7 +64,7 @@ ELLIPSOID = {"striking ellipsoid"}
 STRIKES = {"corner", "striking capsule", "striking cylinder", "striking mesh", *ELLIPSOID}
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("name", "noted"),
     [
@@ -289,6 +289,7 @@ def test_engine_that_declines_every_scene_fails():
     assert found["time"].outcome == "declined"
 
 
+@pytest.mark.extended
 def test_record_that_differs_from_advance_by_rounding_is_noted():
     """A native record may round differently; `repeats` passes."""
     rounded = "    def record(self, steps, every=1):\n        rows = super().record(steps, every)\n        rows[1:] *= 1 + 2.0**-52\n"
@@ -449,7 +450,7 @@ def test_engine_without_batches_declines_their_check():
     assert (found.outcome, found.message) == ("declined", "prepare_batch returns None: the engine simulates one scene at a time")
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("attribute", "member", "scene"), [("friction", 2, "slippery-floor"), ("rest_speed", 3, "corner")])
 def test_batch_with_a_number_of_its_first_scene_fails(attribute, member, scene):
     class First(Wang):

@@ -65,6 +65,7 @@ def test_wrong_shape_is_named(monkeypatch, shape, built, message):
     assert (found.outcome, found.message) == ("failed", message)
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("shape", ["capsule", "cylinder", "ellipsoid", "mesh"])
 def test_swapped_moments_of_inertia_are_named(monkeypatch, shape):
     right = mujoco_model.principal_frame

@@ -29,7 +29,7 @@ def test_ball_by_the_law_of_the_exact_solution_passes():
     assert not any(engine.declines(probe.scene) for probe in PROBES if probe.name in BALLS)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("law", "check", "message"),
     [
@@ -59,6 +59,7 @@ def test_symptom_states_what_is_wrong_and_by_how_much(law, check, message):
     assert found[check].startswith(message)
 
 
+@pytest.mark.extended
 def test_errors_are_stated_only_where_they_exceed_what_is_allowed():
     found = failed(Bouncing(title="planted", law=with_restitution(lambda e, speed: min(1.0, 1.01 * e))), "bouncing ball")["bouncing ball"]
     assert "position is off by 0.0025 m (allowed: 0.0008 m); velocity is off by 0.0123 m/s (allowed: 0.007 m/s)" in found
@@ -73,12 +74,14 @@ def test_fault_that_another_probe_excludes_is_not_named():
     assert set(found.values()) == {SQUARED}
 
 
+@pytest.mark.extended
 def test_ball_whose_rebounds_end_early_is_not_said_to_sleep():
     [message] = failed(Bouncing(title="dead", law=with_restitution(lambda e, speed: e if speed > 1.0 else 0.0)), "dull ball").values()
     assert "sleep" not in message
     assert "restitution is 0" not in message
 
 
+@pytest.mark.extended
 def test_restitution_of_the_opposite_sign_is_not_too_high():
     """A turn the wrong way in the first impact drives the corner into the floor."""
 
@@ -110,7 +113,7 @@ def test_height_of_the_first_contact_is_stated_only_if_it_is_wrong():
     assert truth_for(ball.scene).events[0].before[1] == pytest.approx(0.1)
 
 
-@pytest.mark.sample(7)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("title", "check", "message"),
     [

@@ -79,6 +79,7 @@ def test_armature_slows_the_fall_and_is_found_in_a_default_class(tmp_path):
     assert str(body.facts.settings["armature"]) == 'armature="0.5" (model.xml, line 3)'
 
 
+@pytest.mark.extended
 def test_gain_of_energy_is_a_time_step_error_that_rk4_removes(tmp_path):
     world = FREE.format('<geom type="box" size=".008 .044 .089" mass=".09"/>')
     body = body_of(tmp_path, world)
@@ -239,6 +240,7 @@ def test_wrong_file_ends_in_one_line(tmp_path, text, message):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.extended
 def test_fluid_and_wind_act_as_in_mujoco_and_are_named(tmp_path):
     import mujoco
 
@@ -258,6 +260,7 @@ def test_fluid_and_wind_act_as_in_mujoco_and_are_named(tmp_path):
     assert remedy.value == pytest.approx(4.905, rel=3e-3)
 
 
+@pytest.mark.extended
 def test_pyramid_is_told_from_dry_friction_of_the_joint(tmp_path):
     world = '<body name="b" pos="0 0 1"><joint type="free" frictionloss=".01"/><geom type="box" size=".05 .05 .02" mass="1"/></body>'
     found = findings_of(body_of(tmp_path, world))

@@ -100,6 +100,7 @@ def test_nothing_is_written_to_the_working_directory(tmp_path, monkeypatch):
 
 
 # Velocity ratio of a ball dropped from 1 m, at 1/60, 1/240, 1/1000 and 1/4000 s: v+ = e v- at any step.
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["mujoco", "pybullet"])
 @pytest.mark.parametrize(("restitution", "dt"), list(product([0.0, 0.3, 0.5, 0.8, 0.95], [1 / 60, 1 / 240, 1 / 1000, 1 / 4000])))
 def test_restitution_of_calibrated_engines(name, restitution, dt):

@@ -109,6 +109,7 @@ def test_balls_move_the_same_without_the_exact_diagonal(name, scene_name, instal
     np.testing.assert_array_equal(simulate(scene, name, 2e-3).states, with_all.states)
 
 
+@pytest.mark.extended
 def test_only_flags_of_the_version_are_set(installed):
     """In settings and in programs to paste; without a contact, none but autoreset."""
     import mujoco

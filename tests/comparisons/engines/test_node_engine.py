@@ -136,7 +136,7 @@ def test_node_ends_with_its_engine_process(engine_processes):
     wait_for_its_end(process)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("end", ["", "; os.kill(os.getpid(), 9)"])
 def test_node_ends_with_python(end, tmp_path):
     program = f"import os, test_node_engine as own; print(own.started(None), flush=True){end}"

@@ -31,7 +31,7 @@ def scene(body, start, friction="none", restitution=0.5, duration=0.6):
     return load({"duration": duration, "body": body, "start": start, "gravity": {"acceleration": [0.0, -9.8, 0.0]}, "floor": floor})
 
 
-@pytest.mark.sample(2)
+@pytest.mark.extended
 @pytest.mark.parametrize("engine_name", [EXACT_WANG, "mujoco", "pybullet"])
 def test_a_body_is_the_same_in_another_frame_of_its_own(engine_name):
     """Vertices and tensor turned in the body, and the orientation turned back: the same motion, but for what a contact solver leaves."""
@@ -66,7 +66,7 @@ def errors_on_one_point(one, name, dt):
     return np.array([np.linalg.norm(motion.position - exact.position, axis=1).max(), turned.max()])
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.filterwarnings("ignore:contacts slip")
 @pytest.mark.parametrize("name", ON_ONE_POINT)
 @pytest.mark.parametrize("engine_name", [EXACT_WANG, "mujoco"])
@@ -77,6 +77,7 @@ def test_motions_on_one_point_converge_to_the_exact_ones(name, engine_name):
     assert np.all(coarse / fine < 4.0**1.7)
 
 
+@pytest.mark.extended
 @pytest.mark.filterwarnings("ignore:in maximal coordinates", "ignore:Bullet has no ellipsoids")
 def test_pybullet_rolls_a_rim_and_a_weighted_cylinder_but_no_ellipsoid():
     """At 0.25 ms, to 3 % of a radian turned; its ellipsoid is a hull, which does not rock on its faces."""

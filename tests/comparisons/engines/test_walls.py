@@ -34,7 +34,7 @@ def motion(name, own, dt):
         return simulation.record(own.steps(dt))
 
 
-@pytest.mark.sample(2)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ENGINES)
 def test_ball_between_floor_and_wall_follows_the_exact_solution(name):
     """Each impact is up to a step late (a spring: up to its steps), so that the ball is off by the change of velocity times that."""
@@ -54,7 +54,7 @@ def test_ball_between_floor_and_wall_follows_the_exact_solution(name):
 FLAT = [*((name, body) for name in ("wang[law=coulomb]", "mujoco") for body in BODIES), ("pybullet", "box"), ("pybullet", "points")]
 
 
-@pytest.mark.sample(6)
+@pytest.mark.extended
 @pytest.mark.parametrize(("name", "body"), FLAT)
 def test_body_that_strikes_a_wall_flat_comes_straight_back(name, body):
     """With the wall's restitution, not the floor's, and without turning."""
@@ -74,6 +74,7 @@ def test_friction_is_that_of_the_surface_struck(name):
         np.testing.assert_allclose(last[7:10], [-3.0, 0.0, 2.0 * left], atol=5e-3)
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     "name", ["wang", "mujoco", "mujoco[profile=default]", "mujoco[floor=mesh]", "pybullet", "pybullet[profile=default]"]
 )

@@ -23,7 +23,7 @@ def run(scene, engine, dts=STEPS):
     return ds.run(scene, engine, dts)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("engine", "cause", "order"),
     [
@@ -91,6 +91,7 @@ def test_bounce_converges_at_first_order_after_averaging_start_phases(core_run):
     assert "drop-ball-lively" not in set(found.asymptotic_errors("model")["scene"])
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("more", [1.003, 0.997])
 def test_small_restitution_fault_is_a_model_error(more):
     """.3 % of restitution in a first-order engine are found without any bound of the scene."""
@@ -159,7 +160,7 @@ def with_error(order, error):
     return type("Made", (WithError,), {"order": order, "error": staticmethod(error), "__doc__": "made"})()
 
 
-@pytest.mark.sample(4)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("claimed", "error", "verdict"),
     [

@@ -191,6 +191,7 @@ def test_public_function_takes_numbers_for_arrays():
     assert ds.error_budget([4e-3, 2e-3, 1e-3], [4.0, 2.0, 1.0], 1.0, 0.0, 0.0) == error_budget(H, np.array([4.0, 2.0, 1.0]), 1.0, 0.0)
 
 
+@pytest.mark.extended
 @given(st.permutations([0, 1, 2]))
 def test_steps_may_come_in_any_order(order):
     """The budget does not depend on the order of the steps."""
@@ -229,7 +230,7 @@ def test_intervals_contain_the_asymptotic_error(family, steps):
     assert not any(one.cause == "discretisation" for one in found if one.is_large)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("steps", [3, 5])
 @pytest.mark.parametrize("family", ["order 1", "order 2", "order 3", "order 4"])
 def test_most_series_of_powers_are_decided(family, steps):

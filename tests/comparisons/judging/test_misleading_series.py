@@ -24,6 +24,7 @@ def test_interval_contains_the_limit_of_two_competing_orders(m, c):
     assert found.cause == ("model" if abs(m) > FIVE[-1] ** 2 else found.cause)
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("family", ["order 2, a little of order 1", "order 3, a little of order 2", "order 2, a little of order 1/2"])
 def test_competing_orders_are_covered_and_decided(family):
     """At five halved steps the interval contains the limit in at least 95 %, and a cause is stated in at least 95 %."""
@@ -33,6 +34,7 @@ def test_competing_orders_are_covered_and_decided(family):
     assert not any(one.cause == "model" for one in found if one.asymptotic == 0.0)
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("family", ["order 1 with a remainder of a time", "order 2 with a remainder of a time"])
 def test_remainder_of_a_time_is_no_model_error(family):
     """Errors that depend on T/h mod 1, at five halved steps, where all remainders follow from that of the coarsest."""
@@ -65,6 +67,7 @@ def test_remainders_have_the_covariance_of_franel(multiples):
     assert moments == pytest.approx(np.array([[0.25 + math.gcd(p, q) ** 2 / (12.0 * p * q) for p in often] for q in often]), abs=1e-15)
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("steps", [*CLOSE, "6", "7"])
 def test_close_and_many_steps_are_covered(steps):
     """Ratios of 1.2 to 1.5, six and seven steps."""

@@ -53,13 +53,14 @@ def test_short_lengths_and_a_low_rate_are_alternatives() -> None:
         assert shares == {"length scale": pytest.approx(-0.02, abs=1.5e-3), "rate": pytest.approx(-0.01, abs=7.5e-4)}
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("factor", "unit"), [(1 / 0.0254, "inch"), (1000.0, "mm")])
 def test_another_unit_of_length_is_named(factor: float, unit: str) -> None:
     found = only(log_check(changed(sound(), position=lambda toss: factor * toss.position)))
     assert (found.kind, cure(found)) == ("unit", {"length_unit": unit})
 
 
+@pytest.mark.extended
 def test_another_unit_of_time_is_named() -> None:
     found = only(log_check(changed(sound(), t=lambda toss: 1e3 * toss.t)))
     assert (found.kind, cure(found)) == ("unit", {"time_unit": "ms"})
@@ -74,7 +75,7 @@ def test_another_upward_axis_is_named() -> None:
     assert (found.kind, cure(found)) == ("up", {"up": "z"})
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("change", "keys"),
     [
@@ -101,6 +102,7 @@ def _rolled(toss: Toss) -> Any:
     return np.roll(multiply(np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]), toss.orientation), 1, axis=1)
 
 
+@pytest.mark.extended
 def test_a_point_beside_the_centre_is_a_pair_of_alternatives() -> None:
     check = log_check(sound(offset=(0.0, 0.005, 0.0), spin=8.0, body=CUBE | {"inertia": "solid"}))
     found = only(check)
@@ -112,6 +114,7 @@ def test_a_point_beside_the_centre_is_a_pair_of_alternatives() -> None:
     assert mass["body.inertia"] == pytest.approx(check.flights.log.header.body.moments)
 
 
+@pytest.mark.extended
 def test_a_missing_frame_is_named_with_its_place() -> None:
     log = sound(count=8)
     toss = log.tosses[3]
@@ -121,6 +124,7 @@ def test_a_missing_frame_is_named_with_its_place() -> None:
     assert (found.kind, found.toss, found.value, found.frame) == ("frame dropped", "3", 1, 7)
 
 
+@pytest.mark.extended
 def test_uneven_times_are_a_finding_unless_the_body_moved_at_these_times() -> None:
     log = sound()
     rng = np.random.default_rng(5)

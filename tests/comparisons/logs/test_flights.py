@@ -53,6 +53,7 @@ def test_a_flight_ends_at_the_last_frame_but_one_before_the_impact() -> None:
         assert impact - 2.0 / 148.0 <= last < impact
 
 
+@pytest.mark.extended
 def test_a_toss_below_the_floor_has_no_flight_unless_half_of_them_are_below() -> None:
     log = made(6, 6, header={"floor": {"restitution": 0.3, "friction": 0.3}}).log
 
@@ -82,7 +83,7 @@ def test_covariance_of_slow_errors_is_that_of_a_twice_integrated_white_noise() -
         assert Noise(0.0, 2.0).covariance(t)[i, j] == pytest.approx(4.0 * expected, rel=1e-14)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("sets", "count", "body"), [(3, 10, BRICK), (2, 30, CUBE)])
 def test_intervals_of_parameters_and_starts_hold(sets: int, count: int, body: dict[str, object]) -> None:
     # 30 starts × 12 components, which depend on each other in pairs: the share inside has a standard deviation of 0.016.

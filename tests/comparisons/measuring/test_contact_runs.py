@@ -75,7 +75,7 @@ def bouncing(dt, wrong):
     return Trajectory.from_states(dt * np.arange(len(states)), states, 0.5 * dt)
 
 
-@pytest.mark.sample(16)
+@pytest.mark.extended
 @pytest.mark.parametrize("dt", [4e-3, 1e-3, 2.5e-4])
 @pytest.mark.parametrize("name", WRONG_IN_FLIGHT)
 def test_impact_is_told_from_an_acceleration_that_is_wrong_in_flight(name, dt):

@@ -160,5 +160,4 @@ def test_only_the_faults_of_the_note_break_the_laws(core_run):
         ("drop-box-slippery", "pybullet", "friction_cone_excess", "limited"),
         ("drop-box-turning", "pybullet", "friction_cone_excess", "limited"),
         ("drop-tetra-turning", "pybullet", "friction_cone_excess", "limited"),
-        ("toss-cube", "pybullet", "friction_cone_excess", "limited"),
     }

@@ -80,7 +80,7 @@ def components(name, metric, motion):
     return METRICS[metric].average_components([Comparison.with_truth(scene, motion, truth_for(scene))]).parts
 
 
-@pytest.mark.sample(3)
+@pytest.mark.extended
 @pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [1e-12, 0.0, 0.0], [0.0, -3e-6, 4e-6], [0.6, 0.8, -2.4], [0.0, 3.1, 0.0]])
 def test_planted_attitude_error_has_its_components(turn):
     """The rotation vector, as scipy has it, whatever the sign of the quaternion."""
@@ -316,7 +316,7 @@ def rebounding(scene, dt, restitution, waits=0.0, stops=0.0):
     return Trajectory.from_states(t, states)
 
 
-@pytest.mark.sample(55)
+@pytest.mark.extended
 @pytest.mark.parametrize("dt", [5e-3, 1e-3])
 @pytest.mark.parametrize("kind", [{}, {"waits": 0.3}, {"stops": 0.2}, {"stops": 2.0}])
 @pytest.mark.parametrize("restitution", [0.3, 0.5, 0.9])

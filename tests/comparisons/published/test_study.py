@@ -53,6 +53,7 @@ def test_unknown_names_suggest_the_nearest():
         quantity("max E")
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("name", "tool", "case"),
     [
@@ -117,6 +118,7 @@ def test_kanes_formula_solves_the_equations_of_motion():
 CHANGED_DIGIT = {"printed": ("0.0130709", "0.012462", "0.049")}
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("name", "tool", "case", "changes"),
     [

@@ -109,6 +109,7 @@ def with_reasons(baseline):
     return [(row, baseline.acceptances[row["by"]].reason) for row in baseline.results.to_dict("records")]
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("numpy", ["1.0", "2.0", "3.0"])
 def test_union_merge_keeps_what_two_branches_accepted(release, numpy, tmp_path):
     """Scenes, engines and moves: wherever git finds a conflict both sides stay, and each result keeps its own reason."""

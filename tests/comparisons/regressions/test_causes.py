@@ -53,7 +53,7 @@ def consistent_with(engine, *scenes, steps=STEPS):
     return sentence if sentence.startswith("Possible cause") else ""
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("title", "engine", "scenes", "size", "words"),
     [
@@ -127,7 +127,7 @@ def test_known_fault_is_named(title):
     assert words[title] in consistent_with(TITLED[title], "fall-spin", "spin-asymmetric", "drop-ball-backspin")
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     "engine",
     [faulty_engine("exact", OF["gyroscopic term"], 0.01), made.engine_with("turned", made.turned_by(0.1)), made.Exact()],

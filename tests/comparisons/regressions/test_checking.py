@@ -89,7 +89,7 @@ def block():
     return scene, accept(run(scene, "mujoco", 2e-3), Baseline(), "first", TODAY)[0]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("seed", [0, 1])
 def test_corner_whose_contact_depends_on_rounding_does_not_fail(block, seed, monkeypatch):
     """All starts an eps away: rounding decides for all of them whether they touch; measured 1.4 times what one phase may do."""

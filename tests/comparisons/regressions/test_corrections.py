@@ -68,6 +68,7 @@ def test_changed_metric_with_the_same_motions_is_a_correction_of_dropspin(accept
     )
 
 
+@pytest.mark.extended
 def test_changed_metric_does_not_excuse_a_changed_engine(accepted, monkeypatch):
     """Its version and adapter are the same, but its motions are others."""
     corrected(monkeypatch)
@@ -82,6 +83,7 @@ def test_changed_metric_does_not_excuse_a_changed_engine(accepted, monkeypatch):
     assert CORRECTION not in said(checked, accepted)
 
 
+@pytest.mark.extended
 def test_results_of_changed_motions_are_no_corrections_beside_those_of_the_same_motions(accepted, monkeypatch):
     """The results at a time step whose motions are the same are corrections; those at another are not."""
     corrected(monkeypatch)

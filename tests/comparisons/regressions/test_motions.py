@@ -23,7 +23,7 @@ def one_ulp_after_a_tenth_of_a_second(state, time):
     return state
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("engine", ["wang", "mujoco"])
 def test_repeated_run_has_equal_motions(engine):
     """Two runs, in processes of their own."""

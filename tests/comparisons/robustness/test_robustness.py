@@ -253,7 +253,7 @@ class Frozen(Exact):
         return FrozenSimulation(scene)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["drop-ball", "drop-box-flat", "slip-stick"])
 def test_engine_that_never_moves_is_sound_nowhere(name):
     """At any step and height, even where the metrics cannot resolve the motion."""

@@ -27,6 +27,7 @@ def settings_that_explain(label, scene_name, metric, duration=None):
 BOUNCE, DRIFT = ("drop-ball", "bounce_height_error", 0.9), ("fall-spin", "energy_drift", 0.3)
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("planted", "harmless", "where"),
     [
@@ -62,7 +63,7 @@ def test_default_profiles_are_explained():
     assert sum(found.values()) == pytest.approx(1.0, abs=1e-3)
 
 
-@pytest.mark.sample(8)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("name", "scene_name", "dt"),
     [
@@ -95,6 +96,7 @@ def test_shares_of_known_functions():
     assert of(lambda a, b: float("nan") if not a else 1.0, "a", "b") == {}  # it does not reach an end
 
 
+@pytest.mark.extended
 def test_run_states_the_settings_that_explain_a_failure():
     ball = load("drop-ball").model_copy(update={"duration": 0.9})
     results = run(ball, ["pybullet[floor_restitution=0,linear_damping=0.04]", "pybullet"], [2e-3], quick=True)

@@ -27,14 +27,14 @@ def failures(table):
     return table[table["verdict"].isin(["failed", "crashed", "diverged", "timed_out"])]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("engine", SOUND)
 def test_sound_engine_raises_no_alarm(engine):
     table = run(["drop-ball", SPIN], engine()).table
     assert failures(table).empty
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("engine", "starts"), [(Adaptive, "few_start_phases"), *((one, "all_start_phases") for one in (InnerStep, Substeps))]
 )

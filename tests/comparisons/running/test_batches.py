@@ -36,6 +36,7 @@ def mixed(name):
     return members
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("label", ["wang", "wang[law=coulomb,contact=sequential]", "mujoco", "mujoco[body=mesh]"])
 def test_scenes_with_other_numbers_have_the_bits_of_single_simulations(label, name):

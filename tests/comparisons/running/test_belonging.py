@@ -82,7 +82,7 @@ def test_sound_motion_is_measured(scene, every):
     assert found["position_error"] == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.sample(12)
+@pytest.mark.extended
 @pytest.mark.parametrize("engine", ["wang[law=coulomb]", "mujoco", "mujoco[profile=default]", "pybullet", "pybullet[profile=default]"])
 @pytest.mark.parametrize(
     "scene", ["drop-ball", "drop-box-corner", "spin-dzhanibekov", "fall-spin", "drop-ball-backspin", "slide-box", "rock-block"]

@@ -76,7 +76,7 @@ def test_an_exact_engine_raises_no_alarm(drawn):
     assert judged.groupby("scene").size().reindex([scene.name for scene in drawn]).min() >= 3
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("change", "families"),
     [

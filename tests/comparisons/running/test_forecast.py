@@ -22,7 +22,7 @@ def prepared(name, quick=False):
     return StartPhase(scene, ds.truth_for(scene), quick)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.extended
 @pytest.mark.parametrize("quick", [False, True])
 @pytest.mark.parametrize("name", SCENES)
 def test_simulations_are_those_that_a_run_does(name, quick):

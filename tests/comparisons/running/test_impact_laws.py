@@ -71,7 +71,7 @@ def turning(request):
     return run(request.param, [following("cone"), following("integrated-newton")], quick=True)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 def test_engine_that_follows_another_law_is_recognised_and_still_judged_by_that_of_the_scene(turning):
     """At the other law to 1e-12, at the finest time step; its errors fail, and the distance is no check."""
     other = of_kind(turning, "other_law", "follows-integrated-newton").set_index("truth")
@@ -88,6 +88,7 @@ def test_engine_that_follows_another_law_is_recognised_and_still_judged_by_that_
     assert min(apart) > 1e-3
 
 
+@pytest.mark.extended
 def test_engine_that_follows_the_law_of_the_scene_is_away_from_the_others_and_passes(turning):
     other = of_kind(turning, "other_law", "follows-cone")
     assert other["value"].abs().min() > 1e-3
@@ -120,7 +121,7 @@ def test_pull_fails_under_every_law():
         assert of_kind(found, "asymptotic_error", "pulled").set_index("metric")["verdict"]["contact_pull"] == "failed"
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_solution_passes_under_each_law_of_the_scene(law):
     """Restitutions of Poisson and Stronge are no ratio of speeds, and integrated friction may push along the remaining slip."""
@@ -130,7 +131,7 @@ def test_exact_solution_passes_under_each_law_of_the_scene(law):
     assert set(found.table.loc[found.table["kind"] == "other_law", "truth"]) == {*LAWS} - {law}
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("law", LAWS[:2])
 def test_exact_solution_whose_impact_gains_energy_passes(law):
     """As Newton's restitution makes it do at a rough corner (T. R. Kane, 1984): by 18 % of the kinetic energy here."""

@@ -24,6 +24,7 @@ def row(below, quick):
     return found
 
 
+@pytest.mark.extended
 def test_bound_that_the_choice_of_starts_may_decide_is_not_judged():
     full = abs(row(1.0, quick=False)["value"])
     for share, verdict in ((1.02, "passed"), (0.98, "failed")):

@@ -14,6 +14,7 @@ import dropspin as ds
 BALL = ds.load("drop-ball")
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("engine", "verdict", "reason", "code"),
     [
@@ -150,7 +151,7 @@ def test_malformed_record_is_refused(engine, reason):
     assert "normalised" not in row["reason"]  # no length grows from step to step
 
 
-@pytest.mark.sample(9)
+@pytest.mark.extended
 @pytest.mark.usefixtures("few_start_phases")
 @pytest.mark.parametrize("dt", [4e-3, 2e-3, 1e-3])
 @pytest.mark.parametrize("scene", ["drop-ball", "drop-ball-lively", "drop-box-flat", "drop-box-corner", "drop-box-sticking"])

@@ -87,6 +87,7 @@ def test_table_is_the_same_after_a_worker_is_killed(workers, tmp_path):
     assert children_of(pids[0]) == []
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("workers", [0], indirect=True)
 def test_scheduler_without_workers_is_reported(workers, tmp_path, monkeypatch):
     monkeypatch.setattr(connection, "WORKER_TIMEOUT", 0.5)

@@ -36,7 +36,7 @@ def metrics_of_a_run(scene, motion):
     return [*values, rebound, float(motion.t[Motions.of(scene, motion).last_row_in_motion])]
 
 
-@pytest.mark.sample(30)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", SCENES)
 def test_standard_metrics_are_those_of_a_run(name):
     """All scenes, three engines: the same bits, and NaN in the same places."""
@@ -178,6 +178,7 @@ MASSES = {
 }
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("mixes", [True, False])
 def test_jobs_are_simulated_in_batches(monkeypatch, mixes):
     """Of one time step and, unless the engine mixes scenes, of one scene: with the bits and the reasons of single simulations."""
@@ -220,6 +221,7 @@ TUMBLES = load_sweep(EVERYTHING[0])
 WHOLE = []
 
 
+@pytest.mark.extended
 @settings(max_examples=15)
 @given(st.sets(st.integers(1, TUMBLES.size - 1), max_size=8))
 def test_job_has_the_same_bits_in_any_part(cuts):

@@ -174,6 +174,7 @@ def test_folder_that_holds_something_else_is_refused(tmp_path):
     assert (tmp_path / "mine" / "precious").read_text() == "x"
 
 
+@pytest.mark.extended
 def test_resuming_runs_only_the_missing_parts(tmp_path):
     """A missing part is run again, the others keep their files; an unfinished file is removed."""
     spec = SPEC | {"scenes": ["bounce-95"], "engines": ["mujoco"]}

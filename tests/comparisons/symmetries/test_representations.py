@@ -130,6 +130,7 @@ def test_neighbour_is_the_same_body_a_thousand_times_as_heavy_on_the_floor():
     assert not apart[3:].any()
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("label", "scene", "most"),
     [

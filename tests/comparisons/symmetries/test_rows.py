@@ -86,6 +86,7 @@ def test_stored_run_has_the_rows_and_its_report_shows_them(stored):
     assert "difference of the motion turned by 1 rad" in (stored / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.extended
 def test_baseline_holds_them_and_finds_a_lost_one(stored, tmp_path):
     results = ds.load_results(stored)
     accepted, _ = ds.accept(results, ds.Baseline(), "first", datetime.date(2026, 11, 24))
@@ -125,6 +126,7 @@ def test_batch_that_breaks_down_costs_its_own_rows():
     assert results.exit_code() == 3
 
 
+@pytest.mark.extended
 def test_engine_that_returns_nan_has_a_row_for_its_run_alone(tmp_path):
     results = measured(made.engine_with("undefined", lambda state, time: state * (np.nan if time > 0.1 else 1.0)))
     assert rows_of(results).empty
@@ -140,6 +142,7 @@ def test_run_without_symmetries_is_not_compared_with_accepted_ones(stored):
     assert not checked.table.loc[checked.table["kind"] == "baseline", "metric"].isin(NAMES).any()
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["evil", "position_error", "with <b>=1"])
 def test_stored_run_with_another_name_of_a_symmetry_is_refused(stored, tmp_path, name):
     results = ds.load_results(stored)

@@ -90,6 +90,7 @@ def test_state_that_is_not_complete_is_found_by_stopping_half_way():
     assert not {"turned by 1 rad", "mirrored", AGAIN, NEW_PROCESS} & found
 
 
+@pytest.mark.extended
 def test_rounding_that_depends_on_the_position_is_found_far_away():
     """Single precision that is not declared: 1000 km away, positions are multiples of 6 cm."""
 
@@ -105,6 +106,7 @@ def test_rounding_that_depends_on_the_position_is_found_far_away():
     assert found["in grams"].status == "kept"
 
 
+@pytest.mark.extended
 def test_friction_along_axes_is_found_by_turning_by_an_angle_that_no_grid_has():
     """Each horizontal component of the velocity is slowed by itself; along x, as in the scene, that is right."""
     scene = load("slide-box")
@@ -210,7 +212,7 @@ def test_batch_that_swaps_two_members_is_found(scene):
     assert lost(made.in_batches("swapped", swapped), scene) == {BATCH, *([ONE_CORE] if len(os.sched_getaffinity(0)) > 1 else [])}
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("scene", ["fall-spin", "spin-asymmetric", "drop-ball", "spin-damped"])
 def test_batch_that_steps_all_scenes_with_the_numbers_of_the_first_is_found(scene):
     """Of an engine that says that it mixes scenes."""

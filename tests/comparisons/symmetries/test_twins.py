@@ -22,6 +22,7 @@ def compared(scene, *engines, dt=DT):
     return found
 
 
+@pytest.mark.extended
 def test_findings_do_not_depend_on_the_number_of_jobs():
     engines = [made.Exact(), after(50, 1e-7), "wang"]
     one, two = (twins(["fall-tilted", "spin-asymmetric", "drop-ball"], engines, dt=DT, jobs=jobs) for jobs in (1, 2))

@@ -112,6 +112,7 @@ def test_a_run_is_checked_at_once_with_a_baseline(release, code, verdict, reposi
     assert verdict in " ".join(done.stdout.split())
 
 
+@pytest.mark.extended
 def test_a_run_of_which_nothing_was_accepted_is_kept(repository, tmp_path):
     """Bad input, but the run is not lost: it can be accepted."""
     command = ("run", "fall-spin", "-e", ENGINE, "--dt", "0.004", *BASELINE, "-o", tmp_path / "new")
@@ -126,6 +127,7 @@ def test_a_run_of_which_nothing_was_accepted_is_kept(repository, tmp_path):
     assert dropspin("check", tmp_path / "new", "--baseline", tmp_path / "b.toml", cwd=repository).returncode == 0
 
 
+@pytest.mark.extended
 def test_a_crash_cannot_be_accepted(repository, tmp_path):
     """What was accepted before stays, to the last byte; where no engine was measured, no file is written."""
     shutil.copy(repository / "dropspin-baseline.toml", tmp_path / "b.toml")
@@ -141,7 +143,7 @@ def test_a_crash_cannot_be_accepted(repository, tmp_path):
     assert not (tmp_path / "none.toml").exists()
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("fault", ["raise RuntimeError('no')", "import no_such_library"], ids=["broken", "missing"])
 def test_summary_counts_an_engine_that_could_not_be_used(fault, tmp_path):
     (tmp_path / "my_engine.py").write_text(fault)
@@ -153,6 +155,7 @@ def test_summary_counts_an_engine_that_could_not_be_used(fault, tmp_path):
     assert {row[0].strip().replace("\\", ""): int(row[-1]) for row in rows[1:]} == {ENGINE: 1, "wang": 0}
 
 
+@pytest.mark.extended
 def test_an_engine_that_can_no_longer_be_imported_loses_its_accepted_results(repository, junit_schema, tmp_path):
     """CI learns of it in every form."""
     (tmp_path / "my_engine.py").write_text("import no_such_library")

@@ -105,6 +105,7 @@ def test_whole_traceback_of_an_adapter_is_printed_on_request(raising):
     assert row["message"] == ERROR
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("environment", [{}, TERMINAL], ids=["pipe", "terminal"])
 def test_texts_of_an_adapter_do_not_control_the_terminal(raising, environment):
     """Neither its exceptions, nor the lines of its file in a traceback; JSON has the same text in escapes."""
@@ -149,7 +150,7 @@ def test_rows_fit_a_terminal_of_80_columns(raising):
 ENGINE = "from dropspin import Engine\nclass Mine(Engine):"
 
 
-@pytest.mark.sample(7)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("text", "code", "message"),
     [

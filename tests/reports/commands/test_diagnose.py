@@ -90,6 +90,7 @@ def test_page_shows_what_the_command_prints(tmp_path, arguments):
     assert [line for line in shown if " ".join(line.split()) not in printed] == []
 
 
+@pytest.mark.extended
 def test_mesh_is_a_solid_of_a_density(tmp_path):
     corners = [f"v {x} {y} {z}" for x in (0, 0.1) for y in (0, 0.2) for z in (0, 0.3)]
     faces = ["1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4"]

@@ -7,6 +7,7 @@ import pytest
 from support.cli import dropspin
 
 
+@pytest.mark.extended
 def test_a_scan_is_printed_and_written(tmp_path):
     """Sound ranges and largest steps on the terminal; the folder; every point as JSON."""
     asked = ("limits", "spin-principal", "-e", "mujoco", "-e", "pybullet", "--axis", "step")

@@ -93,6 +93,7 @@ def test_scene_of_each_toss_continues_it(cube):
     assert scene.floor == flights.log.header.floor
 
 
+@pytest.mark.extended
 def test_corrected_header_has_the_remedies_and_loads(cube):
     folder, _ = cube
     log = load_log(folder / "out" / "corrected.toml")

@@ -157,7 +157,7 @@ def test_version_says_what_to_cite(tmp_path):
     assert max(map(len, lines.splitlines())) <= 80
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])
 def test_terminals_without_utf_8(encoding, tmp_path, monkeypatch):
     """A question mark in place of a character that the terminal lacks; no traceback and no other exit code."""
@@ -178,6 +178,7 @@ def test_terminals_without_utf_8(encoding, tmp_path, monkeypatch):
     assert b"?" in printed
 
 
+@pytest.mark.extended
 def test_a_terminal_without_utf_8_in_a_process_of_its_own(tmp_path):
     done = spawn("show", "drop-ball", cwd=tmp_path, PYTHONIOENCODING="ascii", PYTHONUTF8="0")
     assert done.returncode == 0, done.stderr

@@ -39,6 +39,7 @@ friction = "infinite"
 """
 
 
+@pytest.mark.extended
 def test_a_scene_file_runs_and_its_arrays_are_those_of_simulate(tmp_path):
     """Any path works, and the trajectories equal those of the Python call, bit for bit."""
     (tmp_path / "my-scene.toml").write_text(SCENE)
@@ -58,6 +59,7 @@ def test_a_scene_file_runs_and_its_arrays_are_those_of_simulate(tmp_path):
 STIFF = '[[expect]]\nmetric = "penetration"\nbelow = 1e-9\nreason = "no engine is that stiff"\n'
 
 
+@pytest.mark.extended
 def test_a_failed_expectation_is_reported_with_the_command_that_reproduces_it(tmp_path):
     """Exit code 1; the command has the path as it was given, quoted, and all digits of the time step."""
     (tmp_path / "my scene.toml").write_text(SCENE + STIFF)
@@ -108,6 +110,7 @@ def test_json_of_a_run_is_the_table_to_the_last_digit(tmp_path):
     assert re.fullmatch(r"finished spin-principal \(1 of 1 scene, \d+ s elapsed\)", finished)
 
 
+@pytest.mark.extended
 def test_expectations_for_other_steps_are_not_called_missing(tmp_path):
     done = dropspin("run", "spin-asymmetric", "-e", "mujoco[integrator=rk4]", "--dt", "0.01", cwd=tmp_path)
     assert "No expectation covers these engines at these time steps; " in " ".join(done.stdout.split())

@@ -26,7 +26,7 @@ from dropspin.scenarios import DropspinError, load
 DEEP = "[" * 5000 + "]" * 5000
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["../../stray", "/tmp/dropspin-stray", "..", "a/b", "x" * 300, "<img src=x onerror=alert(1)>"])
 def test_history_writes_only_into_its_folder(name, small, tmp_path):
     """A scene's name is no path; every picture has its place, and the page names it."""

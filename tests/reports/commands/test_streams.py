@@ -54,7 +54,7 @@ def full_device():
         yield stream
 
 
-@pytest.mark.sample(2)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", MEASURING)
 def test_closed_pipe_loses_no_file_and_keeps_the_exit_code(name, scenes, closed_pipe):
     """As in `dropspin run | head -1`."""
@@ -65,6 +65,7 @@ def test_closed_pipe_loses_no_file_and_keeps_the_exit_code(name, scenes, closed_
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.extended
 def test_exit_code_of_a_failed_check_is_that_with_a_closed_pipe_and_on_a_full_device(scenes, closed_pipe, full_device):
     for stream in (closed_pipe, full_device):
         run = ("run", "failing.toml", "-e", "wang", "--dt", "0.01", "-o", "out")
@@ -84,6 +85,7 @@ def test_closed_pipe_is_quiet_in_a_process_of_its_own(arguments):
     process.stderr.close()
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("arguments", "code"),
     [

@@ -37,7 +37,7 @@ def strays(tmp_path):
     return tmp_path
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("arguments", [("doctor",), RUN], ids=lambda given: given[0])
 def test_strays_in_the_working_directory_are_not_imported(arguments, strays):
     done = spawn(*arguments, cwd=strays)

@@ -105,7 +105,7 @@ def whole(shared):
     return read_sweep(str(shared("long-sweep", make) / "whole")).drop(columns="time_per_step")
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.usefixtures("engine_processes")
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_sweep_is_resumed(how, whole, tmp_path):

@@ -48,6 +48,7 @@ def test_pareto_front_recommendations_and_files(tmp_path):
     assert all(row["cost_per_world_256"] > 0.0 for row in compared)
 
 
+@pytest.mark.extended
 def test_scene_in_which_no_engine_can_be_compared_leaves_the_others(tmp_path):
     (tmp_path / "short.toml").write_text(SCENE)
     asked = ("tradeoff", "-e", "wang[rotation=exact]", "--metric", "position_error", "--budget", "0.1", "-o", "out")

@@ -47,7 +47,7 @@ def contents(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-@pytest.mark.sample(5)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("option", "message"),
     [
@@ -94,6 +94,7 @@ def full_disk(size):
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
+@pytest.mark.extended
 def test_full_disk_says_that_what_was_measured_is_kept(outputs):
     command = ("run", "ball.toml", "-e", "wang", "--dt", "0.01", "-o", "new")
     with full_disk(20_000):

@@ -232,6 +232,7 @@ def test_source_edited_after_the_import_is_compiled_anew(short, fall):
     assert fall(short, SHORT_FALL)[:2] == ["-2.0", "0"]
 
 
+@pytest.mark.extended
 def test_kernels_compiled_at_the_same_time_are_not_stored_as_each_other(package, fall):
     """Two processes read the index before either wrote it; the one that wrote its entry last writes its kernel first."""
     program = (
@@ -269,6 +270,7 @@ def test_user_s_cache_setting_survives_first_use_in_many_threads():
     assert done.stdout.split() == ["True"]
 
 
+@pytest.mark.extended
 def test_kernels_of_other_numba_settings_are_compiled_anew(short, fall):
     """The cache is in the user's own folder; kernels compiled under other settings are not used."""
     own = {"NUMBA_CACHE_DIR": str(short / "own")}

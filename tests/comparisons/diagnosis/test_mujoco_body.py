@@ -229,7 +229,7 @@ def test_welded_parts_and_an_offset_centre_move_as_in_mujoco(tmp_path):
         ('<mujoco><include file="none.xml"/></mujoco>', "none.xml"),
         ('<mujoco><worldbody><body><freejoint/><geom size="-1"/></body></worldbody></mujoco>', "MuJoCo does not compile it"),
         ('<mujoco><worldbody><body><freejoint/><geom size="nan"/></body></worldbody></mujoco>', "MuJoCo does not compile it"),
-        ("<mujoco/>", "no body moves"),
+        ("<mujoco/>", "no body both moves and has mass"),
         ('<mujoco><worldbody><body name="arm"><joint/><geom size=".1"/></body></worldbody></mujoco>', "--loose"),
     ],
 )

@@ -117,12 +117,14 @@ def test_missing_gyroscopic_term_is_named():
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("title", ["spin reported in the body frame", "friction omitted", "angular damping of 1e-3 not switched off"])
+@pytest.mark.parametrize(
+    "title", ["angular velocity reported in the body frame", "friction omitted", "additional angular damping of 1e-3 1/s in free flight"]
+)
 def test_known_fault_is_named(title):
     words = {
-        "spin reported in the body frame": "angular velocity appears to be in the body frame",
+        "angular velocity reported in the body frame": "angular velocity appears to be in the body frame",
         "friction omitted": "friction is omitted",
-        "angular damping of 1e-3 not switched off": "angular damping 0.001 1/s too high",
+        "additional angular damping of 1e-3 1/s in free flight": "angular damping 0.001 1/s too high",
     }
     assert words[title] in consistent_with(TITLED[title], "fall-spin", "spin-asymmetric", "drop-ball-backspin")
 

@@ -19,7 +19,7 @@ def test_table_notes_and_files(tmp_path):
     assert row.split() == ["-", "height", "at", "0.1", "s", "0.9514405000000001", "0.9514405000000001", "reproduced"]
     [row] = [line for line in lines if "-5.254456882280352" in line]
     assert row.split()[-4:] == ["-5.254456882280352", "-5.253216650960", "error", "-1.2e-03"]
-    assert "FMU, wang: from the velocity one step earlier." in lines
+    assert "FMU, wang: the simulation starts with the velocity that the ball had one time" in lines
     assert lines[-2:] == ["6 of 6 values are reproduced; 0 differ.", "Written: out/reproduce/reproduce.md"]
     folder = tmp_path / "out/reproduce"
     assert {path.name for path in folder.iterdir()} == {"section.json", *(f"reproduce.{kind}" for kind in ("csv", "json", "md"))}

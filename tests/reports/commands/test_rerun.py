@@ -58,7 +58,7 @@ def test_reason_why_there_is_no_motion_in_the_record(again):
     """The small record has drop-ball as declined in 3.9.0."""
     done = again(cell=("mujoco", "3.9.0", "drop-ball"))
     assert done.return_value == 1
-    assert f"In the record declined: {HOSTILE}." in done.stdout
+    assert f"In the record, declined: {HOSTILE}." in done.stdout
     assert "1 ms  declined" in done.stdout
 
 

@@ -54,8 +54,8 @@ def _recommendation(answers: Sequence[Answer], within: float) -> Point:
     ordered = sorted(answers, key=lambda answer: (not answer.is_recommended, -len(answer.within), math.isnan(answer.cost), answer.cost))
     question = f"For {_tolerance(answers[0].metric, within)}"
     if ordered[0].is_recommended:
-        return Point(f"{question} use", [_use(answer) if answer.is_recommended else f"not {_count(answer)}" for answer in ordered])
-    return Point(f"{question} no engine is recommended:", [_count(answer) for answer in ordered])
+        return Point(f"{question} use", [_use(answer) if answer.is_recommended else f"not {_count(answer, within)}" for answer in ordered])
+    return Point(f"{question} no engine is recommended:", [_count(answer, within) for answer in ordered])
 
 
 def _use(answer: Answer) -> str:
@@ -63,9 +63,9 @@ def _use(answer: Answer) -> str:
     return f"{in_sentence(answer.engine)} {_steps(answer)}{_exceptions(answer)}{_absent(answer)}"
 
 
-def _count(answer: Answer) -> str:
+def _count(answer: Answer, within: float) -> str:
     """In how many scenes an engine that is not recommended is within the tolerance."""
-    count = f"within it in {len(answer.within)} of {answer.scenes} scenes"
+    count = f"within {_limit(answer.metric, within)} in {len(answer.within)} of {answer.scenes} scenes"
     return f"{in_sentence(answer.engine)}{_in_brackets(count, _size(answer, names_worst=True))}"
 
 
@@ -89,9 +89,12 @@ def _statement(answers: Sequence[Answer], within: float) -> str:
 
 def _tolerance(metric: str, within: float) -> str:
     """A quantity with the largest error that is asked for."""
-    unit = METRICS[metric].unit
-    of = {"1": f"{100 * within:g} %", "m": f"{100 * within:g} % of the scene's lengths"}.get(unit, f"{within:g} {unit}")
-    return f"{quantity(metric)} within {of}"
+    return f"{quantity(metric)} within {_limit(metric, within)}{' of the lengths of the scene' if METRICS[metric].unit == 'm' else ''}"
+
+
+def _limit(metric: str, within: float) -> str:
+    """The largest error that is asked for: an angle, or percent."""
+    return f"{within:g} rad" if METRICS[metric].unit == "rad" else f"{100 * within:g} %"
 
 
 def _size(answer: Answer, *, names_worst: bool = False) -> str:

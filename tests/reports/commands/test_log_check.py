@@ -57,7 +57,7 @@ def test_sound_recording_has_values_and_no_finding(recording):
     assert len(rows) == pq.read_table(folder / "log_check.parquet").num_rows
     [gravity] = [row for row in rows if row["name"] == "gravity"]
     assert gravity["low"] < 9.81 < gravity["high"]
-    assert "10 tosses, 10 flights" in (folder / "report.html").read_text()
+    assert "10 tosses; 10 flights" in (folder / "report.html").read_text()
     assert CheckedLog.model_validate_json((folder / "section.json").read_text()).findings == []
 
 

@@ -191,7 +191,7 @@ def test_each_claim_is_that_of_the_rows(seed):
     sentences = [sentence.replace(in_sentence(ENGINES[1]), ENGINES[1]) for sentence in map(str, conclusion(run))]
     assert 1 <= len(sentences) <= 5
     for sentence in sentences:
-        size = rf"within (?:{100 * within:g} %(?: of the scene's lengths)?|{within:g} rad)"
+        size = rf"within (?:{100 * within:g} %(?: of the lengths of the scene)?|{within:g} rad)"
         if used := re.fullmatch(rf"For (.+) {size} use (.+)\.", sentence):
             metric = METRICS[used[1]]
             clauses = used[2].split("; ")
@@ -211,7 +211,7 @@ def test_each_claim_is_that_of_the_rows(seed):
 def verify_counts(run, metric, clauses):
     """Clauses on engines that are not recommended."""
     for clause in clauses:
-        said = re.fullmatch(rf"(.+?) \(within it in (\d+) of (\d+) scenes((?:, {SIZE})?)\)", clause)
+        said = re.fullmatch(rf"(.+?) \(within \S+ (?:%|rad) in (\d+) of (\d+) scenes((?:, {SIZE})?)\)", clause)
         engine, within, scenes, size = said.groups()
         assert engine in run.engines
         verify_count(run, metric, engine, int(within), int(scenes), f"{size})")

@@ -271,7 +271,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--dropspin-dt", metavar="SECONDS", type=float, **several, help="Time step; repeatable.")
     group.addoption("--dropspin-baseline", metavar="FILE", help="Baseline of accepted results, as dropspin accept wrote it.")
     parser.addini("dropspin_engines", "Engines under test.", type="linelist")
-    parser.addini("dropspin_baseline", "Baseline of accepted results, a path from the root directory.")
+    parser.addini("dropspin_baseline", "Baseline of accepted results, a path relative to the root directory.")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -337,7 +337,7 @@ def dropspin_check(request: pytest.FixtureRequest, dropspin_run: Callable[..., R
 
 @pytest.fixture
 def dropspin_model(pytestconfig: pytest.Config, tmp_path: Path) -> Callable[..., list[Row]]:
-    """Call with a model file and options of dropspin diagnose; fails the test if it has findings, but for allowed questions."""
+    """Call with a model file and options of dropspin diagnose; fails the test if the model has findings on questions not in `allowed`."""
 
     def diagnose(file: str | os.PathLike[str], *options: str, allowed: Iterable[str] = ()) -> list[Row]:
         __tracebackhide__ = True

@@ -103,7 +103,7 @@ class Scenario(Table):
         source: The source of the problem or of its solution.
         tags: Keywords.
         duration: Duration [s].
-        body: Shape (`sphere`, `box` or `vertices`), size [m], mass [kg] and inertia [kg m²].
+        body: Shape (such as `sphere`, `box` or `mesh`), size [m], mass [kg] and inertia [kg m²].
         start: Position [m], orientation, velocity [m/s] and angular velocity [rad/s] at t = 0, in the world frame.
         gravity: The acceleration of gravity [m/s²], or None.
         floor: The plane y = 0: restitution, friction, rest speed [m/s] and where it ends; None without a floor.

@@ -47,22 +47,22 @@ class ModelFile(Protocol):
 
 @dataclass(frozen=True)
 class BodyDiagnosis:
-    """What was found of one body with one engine.
+    """The diagnosis of one body with one engine.
 
     Attributes:
         name: The body's name.
         engine: The engine.
-        version: Its version.
+        version: The version of the engine.
         dt: The time step of the file, or the engine's default [s].
-        mass: [kg].
-        shapes: Its shapes.
-        surface: What it lands on; empty for nothing.
-        others: What else it may land on, unless what it lands on was named.
-        friction: The coefficient of friction of both together.
-        answers: The answers to all questions, findings included.
-        settings: Where the settings are written, by name.
-        unmodelled: What the file has beside the body and the diagnosis leaves out.
-        breakdown: Why there are no answers; empty if there are.
+        mass: Mass of the body [kg].
+        shapes: The shapes of the body.
+        surface: The name of the surface on which the body lands; empty if there is none.
+        others: Other surfaces on which the body may land; empty if the surface was given.
+        friction: The coefficient of friction between the body and the surface.
+        answers: The measured values with their exact values and findings.
+        settings: By name of a setting, its text in the model file, with file and line.
+        unmodelled: Parts of the file, besides the body, that the simulations leave out.
+        breakdown: The reason why there are no answers; empty if there are answers.
     """
 
     name: str
@@ -124,7 +124,7 @@ def diagnose(
         engines: `mujoco` and `pybullet`, or one of them; by default, those that can read the file.
         bodies: The names of bodies; by default, all free bodies.
         on: The name of the geometry on which the bodies land; by default, the first plane or box with which they collide.
-        loose: Whether to diagnose also links that move on joints, without their joints.
+        loose: Whether to diagnose also links that move on joints, each without its joint.
         density: Density of a mesh [kg/m³].
         restitution: Target for the coefficient of restitution.
         friction: Target for the coefficient of friction.
@@ -136,7 +136,7 @@ def diagnose(
         The values and findings for each body and engine.
 
     Raises:
-        DropspinError: The file is not a model, no engine can read it, or it has no body with a given name.
+        DropspinError: The file is not a model, no engine can read it, or it has no body of a name in `bodies`.
     """
     given, path, wanted = str(file), Path(file), [bodies] if isinstance(bodies, str) else list(bodies)
     ending = path.suffix.lower()

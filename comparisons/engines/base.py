@@ -60,7 +60,7 @@ class KnownLimitation(NamedTuple):
 
     @property
     def is_minor(self) -> bool:
-        """Whether the limitation explains only errors below 1 % of the scale; it is then reported only if a check is `limited`."""
+        """Whether the explained errors are below 1 % of their scales; the limitation is then reported only if a check is `limited`."""
         return bool(self.explained_errors) and max(self.explained_errors.values()) < MINOR
 
 
@@ -77,7 +77,7 @@ class Engine(Configured, ABC):
         """Build the simulation of a scene with a time step [s], in the initial state of the scene."""
 
     def declines(self, scene: Scenario) -> str | None:
-        """The reason why the engine does not simulate a scene ("the adapter ..." if the adapter is the reason); None if it does."""
+        """The reason why the engine does not simulate a scene, or None; it begins with "the adapter" if only the adapter prevents it."""
         return None
 
     shapes: ClassVar[tuple[str, ...]] = ("sphere", "box", "vertices")

@@ -252,7 +252,7 @@ class Configured:
         return [self._with({option: spelled(values[level]) for option, values in finest.items()}) for level in range(count)]
 
     def refined(self, dts: Sequence[float]) -> list[tuple[float, Self]]:
-        """The smallest of the given time steps [s], largest first, each with the engine whose accuracy options are refined accordingly."""
+        """The smallest given time steps [s], one for each accuracy level, in descending order, each with the engine at this level."""
         levels = self.accuracy_levels()
         count = min(len(dts), len(levels))
         return list(zip(sorted(dts)[:count][::-1], levels[-count:], strict=True))

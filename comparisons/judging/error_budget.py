@@ -136,10 +136,11 @@ def error_budget(
         rounding: The largest error that rounding alone may cause at each time step, shape (n,), or one for all, in the unit of the errors.
         signed: Whether the error can be negative; if not, it is treated as the norm of a signed error.
         negligible: An asymptotic error up to this size does not count as a model error; in the unit of the errors.
-        judged_together: The number n of errors that are judged together; the error probability of each is 1/n (C. E. Bonferroni, 1936).
+        judged_together: The number of errors that are judged together; the error probability of each test is divided by this number
+            (C. E. Bonferroni, 1936).
 
     Returns:
-        The cause, the asymptotic error and the order, each with its 95 % interval.
+        The cause, and the asymptotic error and the order with their 95 % intervals.
 
     Raises:
         DropspinError: An argument is invalid.

@@ -64,7 +64,7 @@ class Value:
 
 @dataclass(frozen=True)
 class TossFacts:
-    """The flight of a toss: its first frame, its number of frames (0 without a flight), and its noise relative to that of the others."""
+    """The flight of a toss: its first frame, its number of frames (0 without a flight), and its noise relative to the other tosses."""
 
     name: str
     first: int

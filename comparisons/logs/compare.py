@@ -149,7 +149,8 @@ def log_compare(
         jobs: Number of engines at a time; by default, the number of processors that this process may use. It changes no result.
 
     Returns:
-        The errors of each engine and their parts, the differences between engines, and the groups of engines that do not differ.
+        The errors of each engine and their parts, the differences between engines, and the groups of engines that do not differ
+        significantly.
 
     Raises:
         DropspinError: The recording has no floor, or too few tosses with frames after a flight.

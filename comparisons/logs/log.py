@@ -52,21 +52,21 @@ class Header(Table):
 
     Attributes:
         data: The file with the columns, relative to the header's folder.
-        topic: The topic of an MCAP file with several.
-        body: As in a scene.
-        floor: As in a scene, or None.
-        rate: Frames in a second [1/s]; needed without a column `t`.
+        topic: The topic to read from an MCAP file that has several.
+        body: The body, as in a scene.
+        floor: The floor, as in a scene, or None.
+        rate: Frames per second [1/s]; required if there is no column `t`.
         up: The upward axis of the recording.
         quaternion: The meaning of the columns qx, qy, qz, qw in the order of the four: `wxyz` if the first of them is the scalar part.
-        rotation: What the quaternion takes to what.
+        rotation: The frames between which the quaternions convert vectors, `body-to-world` or `world-to-body`.
         spin_frame: The frame of the columns wx, wy, wz.
         length_unit: The unit of x, y, z.
         time_unit: The unit of t, and of the velocities.
-        length_scale: The recorded lengths over the true ones.
+        length_scale: The ratio of recorded lengths to true lengths.
         tracked_point: The point whose position is recorded, in the frame in which the shape is given [m].
         floor_height: The height of the floor in the recording's frame, true length [m].
         gravity: The true acceleration of gravity [m/s²].
-        noise: If it is known.
+        noise: The noise of the measurements; None if it is not known.
     """
 
     data: Annotated[Text, Field(min_length=1)]
@@ -119,12 +119,12 @@ class Toss:
 
 @dataclass(frozen=True)
 class Cause:
-    """What explains a finding.
+    """A possible cause of a finding.
 
     Attributes:
-        name: Such as `length scale`; `reports.stories.log_check` has the words for each.
-        share: The recorded value over the true one, less 1, of a scale or a rate.
-        keys: The keys of the header that remove it, with their values; those of the body as `body.inertia`.
+        name: The name, such as `length scale`; `dropspin.reports.stories.log_findings` describes each.
+        share: For a scale or a rate, the ratio of the recorded value to the true one, minus 1.
+        keys: The keys of the header that correct the error, with their values; a key of the body is written `body.inertia`.
     """
 
     name: str
@@ -134,17 +134,19 @@ class Cause:
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong with a recording or its header.
+    """An error of a recording or its header.
 
     Attributes:
-        kind: Such as `scale`; `reports.stories.log_check` has the words for each. Of the file itself: `repeated`: a row repeats the one
-            before while the body moves; `gap`: frames are missing; `jitter`: the times are uneven; `rate`: they have another rate.
-        value: What was found [SI].
-        expected: The same by the header, or the usual value.
+        kind: The kind, such as `scale`; `dropspin.reports.stories.log_findings` describes each. Four kinds concern the rows of the file:
+            `repeated` (a row repeats the previous one while the body moves), `gap` (frames are missing), `jitter` (the times are uneven)
+            and `rate` (the frame rate differs from that of the header).
+        value: The measured value, in SI units.
+        expected: The value according to the header, or the usual value, in SI units.
         toss: The name of the toss; empty for the whole recording.
-        frame: The frame of the toss, from 0.
-        causes: Those that the recording cannot tell apart, if several.
-        rests: What the bodies at rest show of the causes: heights over the expected ones, or the difference of opposite faces [m].
+        frame: The frame of the toss, counted from 0.
+        causes: The possible causes; if there are several, the recording does not distinguish them.
+        rests: Evidence from bodies at rest: the ratio of their heights to the expected ones, or the difference of the heights on opposite
+            faces [m].
     """
 
     kind: str

@@ -65,7 +65,7 @@ class ContactResiduals:
     gap: Array
 
     def of_motion(self, number: int) -> "ContactResiduals":
-        """Those of one of several motions."""
+        """The residuals of one of several motions."""
         first, last = np.searchsorted(self.motion, (number, number + 1))
         return ContactResiduals(*(getattr(self, field.name)[first:last] for field in fields(self)))
 

@@ -72,7 +72,7 @@ class Acceptance(Table):
         return digest(self.model_dump())[:KEY_LENGTH]
 
     def stamp_of(self, engine: str) -> dict[str, Any]:
-        """What it has of the provenance of the run, for `attribution.attribute`; baselines of earlier versions have no hashes of code."""
+        """The provenance of the accepted run, as `attribution.attribute` needs it; files of old dropspin versions have no code hashes."""
         version = self.versions.get(engine_name(engine))
         settings = {engine: {ACCEPTED: self.settings.get(engine, {}) | ({} if version is None else {"version": version})}}
         return self.model_dump() | {"python": self.versions.get("python"), "settings": settings}

@@ -56,7 +56,7 @@ class Checked:
         changes: The results of the run compared with the accepted ones: the table that `changes.changes` returns, largest change first;
             empty without a baseline.
         not_run: Accepted results that the run does not cover, because it has other scenes, engines or time steps.
-        attributions: For each engine whose accepted results fail, the causes to which the failures are attributed, with their numbers.
+        attributions: For each pair of an engine and a cause, the number of failing accepted results that are attributed to the cause.
     """
 
     results: Results
@@ -118,14 +118,15 @@ def accept(
 
 
 def check(results: Results, baseline: Baseline | None = None) -> Checked:
-    """Compare a run with accepted results. The verdicts of its other checks stay the same.
+    """Compare a run with accepted results.
 
     A result fails if it is absent, or worse than the accepted result by more than the tolerance; a better result passes. A failed check
-    that was accepted as a known failure has the verdict `known`, unless its result is worse than the accepted one.
+    that was accepted as a known failure has the verdict `known`, unless its result is worse than the accepted one; the verdicts of all
+    other checks of the run stay the same.
 
     Args:
         results: The run.
-        baseline: The accepted results, from `load_baseline`; with None, only the other checks of the run count.
+        baseline: The accepted results, from `load_baseline`; with None, only the checks of the run itself count.
 
     Returns:
         `results`, the run with a row of kind `baseline` for each accepted result, whose `exit_code()` is that of the check;

@@ -37,8 +37,8 @@ class Changes:
         surroundings: The differences that affect all engines, as text.
         other_scenes: Scenes whose definition differs between the runs, so their results are not compared.
         in_one_only: Scenes, engines and time steps that were requested in only one of the runs, as text.
-        speed: The change of each engine's speed relative to the others.
-        motions: How many motions of each engine are equal bit for bit; empty if the runs were loaded without trajectories.
+        speed: For pairs of engines, the change of the ratio of their times per step.
+        motions: How many motions of each engine are equal bit for bit in both runs; empty if the runs were loaded without trajectories.
     """
 
     results: pd.DataFrame
@@ -71,8 +71,8 @@ def compare(old: Results, new: Results) -> Changes:
 
     Returns:
         The changes: `results`, a table with `value` and `before` in `unit`, and the `change` (same, better, worse, moved, new or gone);
-        `attributions`, the cause to which the changes of each engine are attributed; `speed`, the change of the time per step; and
-        `motions`, how many motions are equal bit for bit.
+        `attributions`, the cause to which the changes of each engine are attributed; `speed`, the change of
+        the ratio of the times per step of two engines; and `motions`, how many motions are equal bit for bit in both runs.
 
     Raises:
         DropspinError: The runs have no scene, engine and time step in common, or one of them was made with `quick`.

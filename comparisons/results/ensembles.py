@@ -42,13 +42,17 @@ class EnsembleMetric:
 
 ENSEMBLE_METRICS = {
     "energy_halfway": EnsembleMetric(
-        "1", "Energy halfway through, over the scene's energy (of the fall, or of the start's motion).", lambda o: o.energy[:, SAMPLES // 2]
+        "1",
+        "Energy at half the duration, divided by the scene's energy (of the fall, or of the initial motion).",
+        lambda o: o.energy[:, SAMPLES // 2],
     ),
     "energy_at_end": EnsembleMetric(
-        "1", "Energy at the end, over the scene's energy (of the fall, or of the start's motion).", lambda o: o.energy[:, -1]
+        "1", "Energy at the end, divided by the scene's energy (of the fall, or of the initial motion).", lambda o: o.energy[:, -1]
     ),
     "rebound_height": EnsembleMetric(
-        "1", "Largest height of the centre of mass after the first contact, over its start's; 0 without a contact.", lambda o: o.rebound
+        "1",
+        "Largest height of the centre of mass after the first contact, divided by the initial height; 0 without a contact.",
+        lambda o: o.rebound,
     ),
-    "rest_time": EnsembleMetric("s", "Time at which it was last in motion; the scene's end if it still moves.", lambda o: o.rest_time),
+    "rest_time": EnsembleMetric("s", "Last time at which the body moved; the scene's end if it still moves.", lambda o: o.rest_time),
 }

@@ -38,14 +38,14 @@ MOST_ROWS = 60
 
 
 class Status(NamedTuple):
-    """What became of an engine in a scene: its worst verdict, and the reason of its outcome."""
+    """The status of an engine in a scene: its worst verdict, and the reason of its outcome."""
 
     verdict: str
     reason: str
 
     @property
     def outcome(self) -> Outcome:
-        """What readers see of the verdict."""
+        """The outcome that reports show for the verdict, such as `not judged`."""
         return OUTCOMES[self.verdict][0]
 
     @property
@@ -87,9 +87,9 @@ class Results:
 
     @cached_property
     def by_scene(self) -> Mapping[str, "Results"]:
-        """The run of each scene alone, by name, with texts as objects, of which pandas selects rows faster.
+        """The run of each scene alone, by name, with text columns as Python objects, from which pandas selects rows faster.
 
-        To select rows of one scene after the other from all rows takes most of the time of a report.
+        Without this separation, selecting the rows of each scene from the whole table would take most of the time of a report.
         """
         texts: dict[str, Any] = dict.fromkeys(self.table.select_dtypes("str"), object)
         frames = {name: getattr(self, name).astype(texts) for name in FRAMES}
@@ -213,7 +213,7 @@ class Results:
 
     @property
     def is_quick(self) -> bool:
-        """Whether the run was made with few starts, so that it cannot be compared with others; run files before the option lack it."""
+        """Whether the run was made with `quick`, so that it cannot be compared with other runs; False for files without this entry."""
         return bool(self.provenance["asked"].get("quick"))
 
     def exit_code(self) -> int:

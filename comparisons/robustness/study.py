@@ -156,7 +156,7 @@ def find_limits(
         jobs: Number of axes to scan at a time; by default, the number of processors that this process may use. It changes no result.
 
     Returns:
-        For each engine and axis, the ranges in which the engine is accurate and stable, and its failure modes outside them.
+        For each engine and axis, the failure mode at each tested value, or that the engine is sound there.
 
     Raises:
         DropspinError: An engine or an axis does not exist, or the scene does not have the quantity of an axis.

@@ -70,7 +70,7 @@ def simulate(scene: SceneLike, engine: Engine | str, dt: float, every: int = 1) 
         The motion: a row for the initial state and one after each `every` time steps.
 
     Raises:
-        DropspinError: The engine is unknown, not installed, or declines the scene, or the time step does not fit it.
+        DropspinError: The engine is unknown, not installed, or declines the scene, or the time step does not fit the scene.
         Diverged: The simulation diverged.
     """
     scene = as_scene(scene)

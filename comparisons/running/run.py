@@ -60,8 +60,9 @@ def run(
         jobs: Number of scenes to run at a time; by default, the number of processors that this process may use. It changes no result,
             because time steps are timed first, while nothing else runs.
         quick: Whether to run from fewer initial states: 8 instead of 32 start phases, 16 members of an ensemble, and no perturbed initial
-            states in double precision. A check on which sampling noise may decide has the verdict `measured`, and intervals are wider. The
-            results have no tolerances, so `check` with a baseline, `accept`, `compare` and `history` refuse them.
+            states in double precision. A check whose outcome may depend on sampling noise has the verdict `measured`. Intervals are
+            wider than in a full run. The results have no tolerances, so `check` with a baseline, `accept`, `compare` and `history` refuse
+            them.
         on_forecast: Called once, after the time steps were timed, with the time that the simulations will take.
 
     Returns:

@@ -38,12 +38,12 @@ class TwinFinding:
         scene: Name of the scene.
         engine: Label of one engine.
         twin: Label of the other.
-        status: As that of a symmetry: `kept` and `rounding` if rounding explains the difference, up to 1e-5 or above; `nearly kept` and
-            `lost` if it does not; `not run` if one of the engines has no motion.
+        status: If rounding explains the difference, `kept` (up to 1e-5) or `rounding` (above 1e-5); if not, `nearly kept` (up to 1e-5)
+            or `lost` (above 1e-5); `not run` if one of the engines has no motion.
         first: The first time step after which any number of the states differs; 0 is the start, None if all have the same bits.
         before_contact: The largest difference up to the last step before either motion has a contact, of angles [rad] and relative to
             sizes and speeds.
-        after_contact: The largest difference after that; NaN if there is no contact.
+        after_contact: The largest difference after this step; NaN if there is no contact.
         beyond: For each of `LEVELS`, the first time step after which the difference exceeds it; None if it never does.
         unexplained: The first time step after which rounding does not explain the difference; None if it always does.
         reason: Why there is no motion to compare; otherwise empty.

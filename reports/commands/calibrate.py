@@ -13,7 +13,7 @@ from dropspin.reports.terminal.safe import echo
 @click.option("-e", "--engine", "engine", default="mujoco", metavar="ENGINE", help="The engine, with options.")
 @click.option("--restitution", type=click.FloatRange(0.0, 1.0), required=True, metavar="E", help="Coefficient of restitution.")
 @click.option("--dt", type=float, required=True, metavar="SECONDS", help="The time step.")
-@click.option("--friction", default="none", metavar="F", help="none, infinite or a coefficient.")
+@click.option("--friction", default="none", metavar="F", help="Friction: none, infinite or a Coulomb coefficient.")
 @click.option("--shape", type=click.Choice(["ball", "box"]), default="ball", help="The shape of the falling body.")
 @click.option("--as", "language", metavar="LANGUAGE", help="Print only the text to paste: python, mjcf or urdf.")
 @as_json

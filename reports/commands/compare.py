@@ -15,8 +15,8 @@ from dropspin.reports.commands.options import as_json, summary_option, write_tex
 def compare_command(old: str, new: str, summary: str | None, json_output: bool) -> int:
     """Show which results changed between two runs, and the cause: the engine, its settings, dropspin, or the machine.
 
-    OLD and NEW are folders that dropspin run -o wrote, on one machine or on two; write ./history for a folder of that name. Only a loss of
-    accuracy fails the command. Speed, and whether motions are equal bit for bit, are reported, not gated.
+    OLD and NEW are folders that dropspin run -o wrote, on one machine or on two. For a folder named history, write ./history, because
+    history is a command. Changes of speed, and whether motions are equal bit for bit in both runs, do not affect the exit code.
 
     Exit code: 0 nothing is worse, 1 a result is worse, moved or gone, 2 bad input.
     """

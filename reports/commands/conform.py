@@ -26,7 +26,7 @@ def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, 
 
     ENGINE is a name from `dropspin list engines`, or a class of your own, such as my_module:MyEngine.
 
-    Exit code: 0 every check passed, 1 a check failed, 2 bad input, 3 the engine crashed, hung or is not installed.
+    Exit code: 0 no check failed, 1 a check failed, 2 bad input, 3 the engine crashed, hung or is not installed.
     """
     from rich.console import Console
 

@@ -10,7 +10,9 @@ from dropspin.reports.commands.options import as_json, engines_option, jobs_opti
 @click.command("compare")
 @click.argument("recording", metavar="RECORDING")
 @engines_option
-@click.option("--fit", "fits", is_flag=True, help="First fit friction and restitution for each engine, to find their part of its error.")
+@click.option(
+    "--fit", "fits", is_flag=True, help="First fit friction and restitution for each engine, to find the part of the error that they cause."
+)
 @time_limit_option(300.0, "an engine may use for all tosses")
 @jobs_option("engines")
 @output_option("out/log-compare", "for the tables and the report")
@@ -19,8 +21,8 @@ def log_compare_command(recording: str, fits: bool, output: str, json_output: bo
     """Compare engines with the tosses of a recording, each from the state at the end of its flight.
 
     RECORDING is a header, a TOML file that names the body, the units and the file of data; or toss-cube, 100 measured tosses of a cube.
-    Give corrected.toml, which dropspin log check writes. The default engines are mujoco and wang[contact=sequential,law=coulomb], and
-    mujoco and pybullet with default settings.
+    Give corrected.toml, which dropspin log check writes. The default engines are mujoco and wang[contact=sequential,law=coulomb]
+    with calibrated settings, and mujoco and pybullet with default settings.
     """
     from dropspin.comparisons.logs.check import log_check
     from dropspin.comparisons.logs.compare import ENGINES, log_compare

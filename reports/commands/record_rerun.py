@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 @time_limit_option(60.0, "the engine may use for one simulation")
 @as_json
 def record_rerun_command(engine: str, release: str, scene: str, folder: str, resources: "ResourceLimits", json_output: bool) -> int:
-    """Measure a cell of the record again, and compare it bit for bit.
+    """Measure a cell of the record again, and compare the motions with the recorded ones bit for bit.
 
     ENGINE is an engine with options, RELEASE a release of it and SCENE a scene, as in the record. pip installs the release into a
     temporary environment. The exit code is 1 if a motion differs from that of the record; the output then names the versions
-    and the processor, if they differ.
+    and the processor that differ from those of the record.
     """
     from dropspin.comparisons.engines.options import engine_name
     from dropspin.comparisons.record.plan import load_plan

@@ -42,7 +42,7 @@ CORE_ENGINES = ("wang", "mujoco", "pybullet")
 @time_limit_option(300.0, "an engine may use for one scene at one time step")
 @jobs_option("scenes to run")
 @click.option(
-    "--quick", is_flag=True, help="Run few initial states per scene, for a first answer from a slow engine; fewer checks are decided."
+    "--quick", is_flag=True, help="Run few initial states per scene, for a first answer from a slow engine; some checks stay undecided."
 )
 @within_option
 @baseline_option

@@ -45,7 +45,7 @@ class Line:
         width: Width [points]; 0 for markers alone.
         dashes: The dash pattern of the line.
         marker: A marker of matplotlib; empty for none.
-        is_sparse: Whether markers are at a few places only, at others for each line, so that lines that coincide stay visible.
+        is_sparse: Whether only a few points have markers, different points for each line, so that lines that coincide stay visible.
         low, high: A band around the values, shape (n,) each.
         is_step: Whether a value holds until the next one.
         is_fill: Whether only the band is drawn: an envelope.
@@ -74,7 +74,7 @@ class Chart:
         lines: The lines, in the order they are drawn.
         x_log, y_log: Whether an axis is logarithmic.
         ticks: Positions and texts of the ticks of the x axis; empty for automatic ones.
-        reference: Label of the line that can be subtracted from the others; empty if no line has the same times.
+        reference: Label of the line that can be subtracted from the others; empty if no line has the same times as the others.
         rounding: Values below this are rounding errors.
         remark: A sentence below the plot.
         x_range: The limits of the x axis; None for the range of the data.

@@ -108,5 +108,5 @@ def accepted_sentences(results: Results, accepted: pd.DataFrame, known_failures:
         have = counted(unknown, "failing check has", "failing checks have")
         notes.append(f"{have} no comparable result and cannot be accepted.")
     if tally.broken:
-        notes.append(f"{counted(tally.broken, 'engine run')} broke down; results that were accepted earlier stay in the baseline.")
+        notes.append(f"{counted(tally.broken, 'engine run')} broke down; the results accepted for them before stay in the baseline.")
     return notes

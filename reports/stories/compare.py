@@ -19,7 +19,7 @@ MOST_LINES = 12
 
 
 def document(changes: Changes, results: Results) -> Document:
-    """The changes of each kind, notes and the verdict; a terminal also shows the commands that run scenes with worse results again."""
+    """The changes of each kind, notes and the verdict; a terminal also shows the commands that repeat failing scenes."""
     by_engine = changes.regressions.groupby("engine", sort=False)["scene"].unique()
     commands = [
         Paragraph("Reproduce:", reproduce_scenes(results, list(scenes), str(engine)), on_page=False) for engine, scenes in by_engine.items()
@@ -52,7 +52,7 @@ def _tables(changes: Changes) -> list[Part]:
 
 
 def change_cells(row: Mapping[Hashable, Any]) -> dict[str, str]:
-    """The result that changed, its time step, and its values."""
+    """The result that changed, its time step, and its values before and now."""
     return {
         "result": subject(row["metric"], row["kind"]),
         "step": "→ 0" if "," in row["steps"] else in_ms(float(row["steps"])),
@@ -62,7 +62,7 @@ def change_cells(row: Mapping[Hashable, Any]) -> dict[str, str]:
 
 
 def _row(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
-    """The largest change of an engine in a scene, and the number of its other changes in this scene."""
+    """The largest change for an engine in a scene, and how many other results of this engine and scene have changed in the same way."""
     before, after = row["before"], row["value"]
     ratio = abs(after / before) if abs(before) > row["tolerance"] else math.inf  # a ratio of rounding errors is meaningless
     return {
@@ -76,7 +76,7 @@ def _row(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
 
 
 def _notes(changes: Changes) -> list[str]:
-    """Sentences on the causes of changes, the scenes that were not compared, the speeds, and the motions."""
+    """Sentences on the causes of changes, on what was not compared, on speeds, and on motions that are equal in both runs."""
     notes = []
     for engine, cause in changes.attributions.items():
         kinds = changes.results.loc[changes.results["engine"] == engine, "change"]

@@ -1,4 +1,4 @@
-"""The conclusion of a run: for each question which engine to use, at which time step, and where not."""
+"""The conclusion of a run: for each question (an error within a tolerance) which engine to use, at which time steps, and where not."""
 
 import math
 from collections.abc import Sequence
@@ -43,7 +43,7 @@ def conclusion(results: Results) -> list[Point]:
 
 
 def conditions(results: Results) -> dict[str, list[str]]:
-    """The scenes that have a property with which the conclusion excepts scenes, such as Coulomb friction."""
+    """For each property by which the conclusion excepts scenes, such as Coulomb friction, the scenes that have it."""
     within = results.provenance["asked"].get("within") or WITHIN
     excepted = dict.fromkeys(answer.condition for answer in conclude(results, within) if answer.condition and answer.is_recommended)
     return {name: [scene for scene, model in results.scenes.items() if CONDITIONS[name](model)] for name in excepted}

@@ -12,7 +12,7 @@ from dropspin.reports.stories.numbers import formatted
 
 @np.errstate(all="ignore")  # an engine may return 1e300
 def worst_contacts(results: Results, scene_name: str) -> list[dict[str, str]]:
-    """A row for each engine whose body touches the floor at the finest time step: the number of contacts, and the worst for each law.
+    """A row for each engine whose body touches the floor at the finest time step: number of contacts, largest violation of each law.
 
     The motion is the one from the initial state of the scene. The list is empty if the forces of the floor cannot be computed.
     """

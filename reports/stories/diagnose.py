@@ -20,7 +20,7 @@ from dropspin.scenarios.text import counted
 KINDS = {"changed": "changed by the engine", "model": "engine", "target": "target missed"}
 """The words for kinds of findings that are not shown by their names."""
 LEAST = 1e-9
-"""Values below this size are shown as 0, except moments of inertia."""
+"""Absolute values below this one, in SI units, are shown as 0, except moments of inertia."""
 STARTS = {"slide": (" from", " at"), "roll": (" from", "")}
 """The prepositions before an initial speed and before a direction, for questions that do not take `at` and `about`."""
 COLUMNS = (
@@ -144,7 +144,7 @@ def _row(body: BodyDiagnosis, question: str, quantity: str, measured: str, in_fo
 
 
 def _cells(answer: Answer) -> tuple[str, str, str]:
-    """The measured value with its range over start phases, and the two exact values."""
+    """The measured value with its range over impacts at several instants within a time step, and the two exact values."""
     measured = answer.detail if answer.detail and not math.isfinite(answer.measured) else _value(answer.measured, answer.unit)
     if answer.most - answer.least > 0.0:
         measured += f" ({formatted(answer.least)} to {formatted(answer.most)})"
@@ -213,7 +213,7 @@ def _remedies(*same: tuple[Answer, Finding]) -> list[str]:
 
 
 def _value_after(remedy: Remedy, answer: Answer) -> str:
-    """The value measured with a remedy. A spin that does not decay has no decay time; the fraction that it keeps is shown instead."""
+    """The value measured with a remedy. For a spin without a decay time, it is the fraction left after 1 s."""
     value = _value(remedy.value, remedy.unit)
     return value if remedy.unit == answer.unit else f"a spin of which the fraction {value} is left after 1 s"
 
@@ -261,7 +261,7 @@ def summary(diagnosis: Diagnosis) -> str:
 
 
 def charts(body: BodyDiagnosis) -> list[Chart]:
-    """A chart of the rebound over the impact speed, with its range over start phases; empty if the body does not rebound."""
+    """A chart of rebound speed / impact speed over the impact speed, with its range over instants of impact; empty without a rebound."""
     impacts = [answer for answer in body.answers if answer.quantity == REBOUND]
     if not any(answer.most > 0.0 for answer in impacts):
         return []

@@ -234,7 +234,7 @@ def _largest(results: Results, errors: "pd.DataFrame") -> str:
 
 
 def _cost(engine: str, times: Mapping[str, float], compilation: float | None) -> list[str]:
-    """The time per step of an engine, its ratio to that of the fastest engine, and the time to compile a scene if the engine compiles."""
+    """The time per step of an engine, its ratio to that of the fastest engine, and the time to compile a scene, if any."""
     timed = {label: time for label, time in times.items() if not math.isnan(time)}
     if engine not in timed:
         return []

@@ -14,8 +14,8 @@ from dropspin.reports.stories.numbers import duration, left_out
 from dropspin.reports.stories.study import Study
 
 ACCURATE_AND_STABLE = (
-    "Accurate: the engine is sound at this time step and at all smaller ones that were tested. Stable: at these time steps, the only "
-    "failures are errors above the tolerance."
+    "Accurate: the engine is sound at this time step and at all smaller ones that were tested. Stable: at all of these time steps, "
+    "errors above the tolerance are the only failures."
 )
 COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterion", "size", "message")
 

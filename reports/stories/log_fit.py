@@ -55,11 +55,12 @@ class FittedLog(Study):
             rows.append({"engine": fit.friction.engine, "friction": interval(fit.friction), "restitution": "", "discrepancy": ""})
         legend = (
             f"Fitted to the first {fit.frames} frames after the flight of each of {fit.tosses} tosses, with 95 % intervals. The "
-            "discrepancy is the difference from the recorded positions that neither noise nor errors of the initial states explain."
+            "discrepancy is the standard deviation of differences from the recorded poses that neither noise nor errors of the initial "
+            "states explain."
         )
         if fit.friction:
             legend += (
-                " The interval of an engine holds for this engine only; the interval of 'any engine' includes differences between them."
+                " The interval of an engine holds for this engine only; the interval of 'any engine' includes differences between engines."
             )
         unknown = [
             f"{row.parameter.capitalize()} is not identified with {row.engine}: {NOT_IDENTIFIED[row.parameter]}."

@@ -56,7 +56,7 @@ def quantity(metric: str) -> str:
 
 
 def short(value: float) -> str:
-    """Two significant digits, three from 100 on, with an exponent below 0.01 and from 10,000 on; an exact zero is 0."""
+    """Two significant digits, or an integer from 10 to 10,000; with an exponent below 0.01 and from 10,000 on; an exact zero is 0."""
     if value == 0.0 or not math.isfinite(value):
         return formatted(value)
     if 9.95 <= value < 1e4:

@@ -15,7 +15,7 @@ from dropspin.reports.stories.matrix import level
 from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, with_unit, word
 
 GROUPS = {"at least 5 digits": 5.0, "at least 2, less than 5 digits": 2.0, "less than 2 digits": 0.0}
-"""The groups of scenes that an engine gets right and wrong, with the least digits of each; smaller errors than 1e-5 do not matter."""
+"""The groups of scenes that an engine gets right and wrong, with the least digits of each; errors below 1e-5 are not distinguished."""
 
 
 class Cell(NamedTuple):
@@ -28,7 +28,7 @@ class Cell(NamedTuple):
 
 
 def cell(release: Release, label: str, scene: str, dt: float) -> Cell:
-    """The digits of a release in a scene."""
+    """The cell of a release and a scene: the number of correct digits of the leading error, or the mark of the verdict."""
     case, metric = release.cases.get((label, scene, dt)), leading(scene)
     if case is None:
         return Cell("?", None, "not measured", "not measured")
@@ -102,7 +102,7 @@ def _shown(changes: Sequence[Change]) -> Change:
 
 
 def _gained(change: Change) -> float:
-    """The size of the change; -1 if only one of the releases has a value."""
+    """The size of the change in digits; -1 if only one of the two releases has a value."""
     if not change.metric:
         return -1.0
     of = scale(problem(change.scene), METRICS[change.metric].unit)

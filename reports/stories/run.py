@@ -38,7 +38,7 @@ class Overview:
         counts: The number of checks with each verdict.
         statuses: The status of each engine in each scene, by scene and engine.
         profiles: Engines with default settings compared with the calibrated ones.
-        failures: The failures, grouped.
+        failures: The failures; those of one result at several time steps count as one.
         tags: By property, such as Coulomb friction, the scenes that have it; the conclusion excepts scenes by these properties.
         laws: The distances of engines to other impact laws, in scenes in which the laws differ: the rows of `law_rows`.
     """

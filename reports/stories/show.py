@@ -56,7 +56,9 @@ def _other_laws(truth: Truth, others: Mapping[Law, Truth]) -> str:
     """The differences of the velocity after the first impact under the other laws of impacts with friction."""
     after = truth.events[0].after[VELOCITY]
     changes = [f"{law} {np.linalg.norm(other.events[0].after[VELOCITY] - after):.2g} m/s" for law, other in others.items() if other.events]
-    return f"velocity after the first impact differs by: {', '.join(changes)}; these are other models, not errors"
+    return (
+        f"velocity after the first impact differs by: {', '.join(changes)}; the laws are other models, so these differences are not errors"
+    )
 
 
 def _applies_to(expectation: Expectation) -> str:

@@ -14,7 +14,7 @@ WORST_OF = {metric: f"worst_{metric}" for metric in ("energy_drift", "energy_gai
 
 
 def rows(where: str) -> list[dict[str, Any]]:
-    """A row for each engine: its jobs, their verdicts, the largest magnitudes of some metrics (None if undefined), and their time [s].
+    """A row for each engine: its jobs, their verdicts, the largest values of `WORST_OF` (None if undefined), and the time of all steps [s].
 
     The table is read part by part, because it may be larger than memory.
     """

@@ -78,7 +78,7 @@ def legend(findings: Sequence[Finding]) -> str:
 
 
 def sentences(findings: Sequence[Finding]) -> list[str]:
-    """A sentence for each symmetry that an engine does not keep, the largest differences first, and one for each reason not to run."""
+    """A sentence for each symmetry that an engine does not keep, largest difference first, then one for each reason for missing runs."""
     broken = [finding for finding in findings if finding.status in ("lost", "nearly kept")]
     engines = list(dict.fromkeys(finding.engine for finding in findings))
     pairs = dict.fromkeys((finding.engine, finding.symmetry) for finding in broken)
@@ -88,7 +88,7 @@ def sentences(findings: Sequence[Finding]) -> list[str]:
 
 def _broken(findings: Sequence[Finding]) -> str:
     worst, others = findings[0], findings[1:]
-    more = f"; they also differ in {counted(len(others), 'other scene')}" if others else ""
+    more = f"; the motions also differ in {counted(len(others), 'other scene')}" if others else ""
     since = f"from step {worst.step} onwards (t = {worst.time:.4g} s)"
     size = f"{worst.difference:.2g}" if math.isfinite(worst.difference) else "infinite"
     return f"{worst.engine}, {worst.symmetry}: in {worst.scene}, the two motions differ {since}; the largest difference is {size}{more}."

@@ -129,10 +129,10 @@ def _recommendation(study: TradeOff, tolerance: float) -> str:
         ladder = next(ladder for ladder in study.ladders if ladder.engine == nearest.engine)
         error = f"{formatted(nearest.error)}{unit}"
         if nearest.error <= tolerance:
-            none = "no tested configuration is within it at its time step and at all smaller ones"
+            none = "no tested configuration is within this tolerance at its time step and at all smaller ones"
             outcome = f"{none}; {_named(nearest)} has an error of {error}, but a larger one at a smaller time step"
         else:
-            outcome = f"no tested configuration reaches it; the most accurate is {_named(nearest)} with an error of {error}"
+            outcome = f"no tested configuration reaches this tolerance; the most accurate is {_named(nearest)} with an error of {error}"
         tried = f"With this engine, no time step below {in_ms(ladder.steps[-1][0])} was tried"
         return f"{goal}: {outcome}. {tried}, because {_reason(ladder)}."
     sentence, ratio = f"{goal}: {_named(advice.best)}, {duration(advice.best.typical_cost)} per simulated second", advice.ratio

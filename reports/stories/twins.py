@@ -9,7 +9,7 @@ from dropspin.reports.document import Document, Sentences, Table
 LEGEND = (
     "The columns of steps have the first step after which the motions differ at all, or by more than the size in the heading; step 0 is "
     "the initial state. Differences are in radians, or relative to sizes and speeds. Rounding explains a difference if the motion of one "
-    "of the two engines changes as much when the initial state is perturbed by 16 eps (machine epsilon)."
+    "of the two engines changes by a similar amount or more when its initial state is perturbed by 16 eps (machine epsilon)."
 )
 
 

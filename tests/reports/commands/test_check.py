@@ -134,7 +134,7 @@ def test_a_crash_cannot_be_accepted(repository, tmp_path):
     done = dropspin("accept", "out/crashing", "--baseline", tmp_path / "b.toml", "--reason", "x", cwd=repository)
     assert done.returncode == 0
     assert "gone" not in done.stdout
-    assert "3 engine runs broke down; results that were accepted earlier stay in the baseline." in done.stdout
+    assert "3 engine runs broke down; the results accepted for them before stay in the baseline." in done.stdout
     assert (tmp_path / "b.toml").read_text() == (repository / "dropspin-baseline.toml").read_text()
     dropspin("run", "drop-ball", "-e", ENGINE, "--dt", "0.01", "-o", tmp_path / "dead", cwd=repository, RELEASE="crashing")
     done = dropspin("accept", tmp_path / "dead", "--baseline", tmp_path / "none.toml", "--reason", "x", cwd=repository)

@@ -28,7 +28,7 @@ def test_pareto_front_recommendations_and_files(tmp_path):
     assert done.returncode == 0, done.stderr
     output = " ".join(done.stdout.split())
     assert "orientation error within 1e-09 rad: wang[rotation=" in output
-    assert "within 1e-30 rad: no tested configuration reaches it; the most accurate is wang[rotation=" in output
+    assert "within 1e-30 rad: no tested configuration reaches this tolerance; the most accurate is wang[rotation=" in output
     assert "Left out: wang, no convergence observed: orientation error is" in output
     why = "at the last 2 time steps the error fell by less than a fifth each"
     assert f"No smaller time steps than these were tried, because {why}: wang[" in output

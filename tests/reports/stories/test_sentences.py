@@ -109,10 +109,10 @@ def modelled(**tables):
         (published("reproduced"), "1 of 1 value is reproduced; 0 differ."),
         (published("reproduced", "reproduced", "differs", "not run"), "2 of 3 values are reproduced; 1 differs; 1 was not run."),
         (lost("s")[0], "a, mirrored: in s, the two motions differ from step 3 onwards (t = 0.003 s); the largest difference is 0.25."),
-        (lost("s", "t")[0].rpartition("largest ")[2], "difference is 0.25; they also differ in 1 other scene."),
+        (lost("s", "t")[0].rpartition("largest ")[2], "difference is 0.25; the motions also differ in 1 other scene."),
         (
             lost("s", "t", "u", difference=math.inf)[0].rpartition("largest ")[2],
-            "difference is infinite; they also differ in 2 other scenes.",
+            "difference is infinite; the motions also differ in 2 other scenes.",
         ),
         (unchanged("Mon", "Tue"), "No result changed in 2 runs of 1 scene."),
         (modelled(body=SPHERE), "a sphere of 1 kg"),

@@ -42,7 +42,8 @@ def test_nearest_configuration_has_the_reason_why_no_smaller_step_was_tried(foun
     """The conclusion is about the tested steps; a ladder that its budget ended names the option that continues it."""
     [sentence, *_] = tradeoff.sentences(found, [1e-3])
     assert sentence == (
-        "spin-asymmetric, orientation error within 0.001 rad: no tested configuration reaches it; the most accurate is accurate at 10 ms "
+        "spin-asymmetric, orientation error within 0.001 rad: no tested configuration reaches this tolerance; "
+        "the most accurate is accurate at 10 ms "
         "with an error of 4.00e-03 rad. With this engine, no time step below 10 ms was tried, because a run would be too long."
     )
     budgeted = TradeOff(found.scene, found.metric, found.points[:2], found.ladders[:1])
@@ -77,7 +78,7 @@ def test_error_that_is_small_at_a_coarse_step_alone_is_no_recommendation(found):
     crossing = Ladder("accurate", ((0.033, 5e-4), (0.01, 3e-3)), "budget", SPENT)
     points = tuple(CostPoint("accurate", dt, error, np.full(3, 1e-6 / dt), {}) for dt, error in crossing.steps)
     [sentence] = tradeoff.sentences(TradeOff(found.scene, found.metric, points, (crossing,)), [1e-3])[:1]
-    none = "no tested configuration is within it at its time step and at all smaller ones"
+    none = "no tested configuration is within this tolerance at its time step and at all smaller ones"
     assert f"{none}; accurate at 33 ms has an error of 5.00e-04 rad, but a larger one at a smaller time step." in sentence
 
 

@@ -180,7 +180,7 @@ def quoted_constants():
     return {
         "choose-a-step.md": ladder + cost,
         "limits.md": [*runs, f"at least {runner.FEWEST_STEPS_WITHOUT_GRAVITY:,} time steps"],
-        "figures.md": [f"means over {START_PHASES} starts"],
+        "figures.md": [f"means over {START_PHASES} *start phases*"],
         "verdicts.md": [f"run from {START_PHASES} start phases"],
     }
 

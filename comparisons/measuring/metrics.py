@@ -54,7 +54,7 @@ def _at_end_of_each_flight(components: Callable[[Comparison, list[int]], Array])
 def energy_error(case: Comparison) -> Array:
     """Largest difference of the energy from the exact energy in flight, relative to the scene's energy.
 
-    Velocities are first synchronised with positions.
+    Velocities that lag behind the positions are first shifted to the time of the positions.
     """
     return _extremes_of_each_flight(errors.energy_error(case), case)
 
@@ -145,7 +145,8 @@ def contact_momentum_error(case: Comparison) -> float:
 def rest_time_error(case: Comparison) -> float:
     """Time at which the body comes to rest minus the exact time, relative to the exact time.
 
-    The body counts as moving while its kinetic energy, including rotation, exceeds both M (2 g dt)²/2 and 1e-6 M g times its size.
+    The body counts as moving while its kinetic energy, including rotation, exceeds both M (2 g dt)²/2 and 1e-6 M g R. R is the distance of
+    its farthest point from the centre of mass.
     """
     actual, exact = (float(motion.t[Motions.of(case.scene, motion).last_row_in_motion]) for motion in (case.compared, case.exact))
     if exact == 0.0:
@@ -180,7 +181,7 @@ def desync_rate(case: Comparison) -> float:
 
 @_metric("1", "truth", requirements.spins, components=_at_end_of_each_flight(errors.angular_momentum_difference), agreement=True)
 def angular_momentum_error(case: Comparison) -> Array:
-    """Largest difference of the angular momentum from the exact angular momentum in flight, relative to its largest exact value."""
+    """Largest difference of the angular momentum from the exact angular momentum in flight, relative to the largest exact one."""
     return _largest_of_each_flight(errors.angular_momentum_error(case), case)
 
 

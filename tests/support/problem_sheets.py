@@ -74,7 +74,7 @@ def sheet(problem):
     return "\n\n".join(parts) + "\n"
 
 
-EXACT = "An exact solution must agree with every printed digit, within one unit of the last digit. "
+EXACT = "An exact solution counts as correct if it differs from each printed value by at most one unit of the last printed digit. "
 TOLERANCE = """A numerical solution with the time step dt counts as correct if the absolute value of each metric in the table is within its
 bound. The bounds are the same for every engine, and the scene file gives a reason for each. [How results are
 computed](../figures.md) explains the metrics."""
@@ -94,7 +94,8 @@ def _solution(scene, truth):
         return ["No exact solution is known."]
     return [
         f"The solution is computed {KINDS[truth.name]}: {truth.statement}.",
-        f"The table gives states to {DIGITS} significant digits of the largest component of each quantity:",
+        f"The table gives the state at four times. The components of each quantity (x, q, v and ω) have as many decimals as give the "
+        f"largest of them {DIGITS} significant digits; a component that rounds to 0 is written as 0.",
         _states(scene, truth),
         *_impacts(scene, truth),
         *_horizon(scene, truth),
@@ -107,9 +108,10 @@ def _recording(scene):
         paragraph(
             f"""No exact solution is known. The file `scenarios/catalogue/{scene.name}.json` has {len(tosses)} measured tosses with
 {sum(len(toss.t) for toss in tosses):,} frames in all. For each toss it has the times, positions and orientations of the frames, the
-initial state, which is that at the end of the measured flight, and 19 other initial states that the measured flight allows. The initial
-state above is that of the first toss. An error is a mean over the tosses. Its uncertainty follows from the engine's results for the other
-initial states and from the noise of a frame ([measured motions](../measured.md))."""
+initial state, which is the state at the end of the measured flight, and 19 other initial states, drawn at random within the uncertainty
+of this one. The initial state in the table above is that of the first toss. The value of a metric is a mean over the tosses.
+Its uncertainty follows from the engine's results for the other initial states and from the measuring noise of a frame ([measured
+motions](../measured.md))."""
         )
     ]
 
@@ -197,8 +199,8 @@ def _impacts(scene, truth):
         count = f"are {len(events)} impacts" if len(events) > 1 else "is 1 impact"
         text = f"Until t = {number(round(end, 6))} s there {count}."
     shown = events[:MOST_IMPACTS]
-    first = f"the first {MOST_IMPACTS} impacts" if len(events) > MOST_IMPACTS or rest is not None else "every impact"
-    return [f"{text} The table gives {first}, without the components that are always 0:", table(_impact_rows(scene, truth, shown))]
+    first = f"the first {MOST_IMPACTS} impacts" if len(events) > MOST_IMPACTS or rest is not None else "all impacts"
+    return [f"{text} The table gives {first}, without the components that are 0 in all of them:", table(_impact_rows(scene, truth, shown))]
 
 
 def _impact_rows(scene, truth, events):

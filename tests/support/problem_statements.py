@@ -21,7 +21,7 @@ sliding of this point, however large the tangential impulse must be."""
 CONE = """j is such that u_y becomes -e u_y (Newton's restitution), and it is in the cone of Coulomb friction: its horizontal part is at
 most f times its vertical part j_y. After the impact, the point either sticks or slips. If it sticks, the horizontal part of u is 0. If it
 slips, the horizontal part of u is s d with a unit vector d and s > 0, and j = j_y ([0, 1, 0] - f d): friction opposes the slip after the
-impact, whose direction may differ from that before it."""
+impact, which may have another direction than the slip before the impact."""
 EDGE = "The two ends of the edge strike at the same time, with equal velocities; r is the position of the middle of the edge."
 SEVERAL = """If several points touch a plane at the same time, for example when the body rests, these laws do not determine the impulses.
 Each numerical method has its own rule for this case."""

@@ -151,7 +151,7 @@ class Engine(Configured, ABC):
 
 
 class _Stepped(ABC):
-    """What simulations of one scene and of many have in common; a context manager.
+    """The common base of `Simulation` and `BatchSimulation`; a context manager.
 
     Attributes:
         velocity_lag: Time by which the velocity lags the position [s]: half a time step under semi-implicit Euler, 0 if both are at the

@@ -33,13 +33,13 @@ class Attribution:
     """The cause to which the changes of an engine's results are attributed.
 
     Attributes:
-        origin: `absent` if one of the runs has no measurements; `engine` for its version, else `adapter` for the adapter's code, else
-            `settings`; `dropspin` if its version or code differs, and the motions are the same or nothing else differs but the code of a
-            built-in adapter; `surroundings` for dropspin, its code, the libraries and the machine; `either` if both the engine, its
-            adapter, its settings or its motions and the surroundings differ, so that the cause cannot be isolated; `nothing` if the whole
-            provenance is the same.
+        origin: `absent` if one of the runs has no measurements of the engine. `engine`, `adapter` or `settings` for the first of these that
+            differs: the engine's version, the adapter's code, the settings. `dropspin` if its version or code differs, and the motions are
+            the same in both runs or nothing else differs but the code of a built-in adapter. `surroundings` for dropspin, its code, the
+            libraries and the machine. `either` if the surroundings differ and also the engine, its adapter, its settings or its motions,
+            so that the cause cannot be isolated. `nothing` if the whole provenance is the same in both runs.
         message: The cause in a sentence, without the engine's name.
-        is_correction: Whether it is a correction of dropspin, and no change of the engine.
+        is_correction: Whether the cause is a correction of dropspin, not a change of the engine.
     """
 
     origin: Origin

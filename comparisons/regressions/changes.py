@@ -173,7 +173,7 @@ class EqualMotions(NamedTuple):
         engine: Label of the engine.
         equal: Number of motions that are equal.
         compared: Number of motions that both runs have: one for each scene and time step.
-        scene: Scene of the motion whose difference begins earliest in its scene; empty if all are equal. So are the next two.
+        scene: Scene of the motion whose difference begins earliest in its scene; empty if all are equal.
         dt: Time step of that motion [s]; 0 if all are equal.
         step: The first step after which that motion differs, counted from the start, which is step 0; 0 if all are equal.
     """

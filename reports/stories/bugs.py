@@ -91,7 +91,7 @@ def _summary(verdicts: Sequence[tuple[Bug, Verdict]]) -> str:
     kinds = Counter(verdict.kind for _, verdict in verdicts)
     catalogue = sum(verdict.kind in ("shown", "fixed") and not bug.silent for bug, verdict in verdicts)
     of_these = f"{kinds['fixed']} fixed in a later release and {catalogue} detected by a check of the catalogue's scenes"
-    parts = [f"{kinds['shown'] + kinds['fixed']} shown (of these, {of_these})"]
+    parts = [f"{kinds['shown'] + kinds['fixed']} reproduced (of these, {of_these})"]
     parts += [f"{kinds[kind]} {kind}" for kind in ("not shown", "not expressible", "not run") if kinds[kind]]
     return f"{counted(len(verdicts), 'case')}: {', '.join(parts)}."
 

@@ -6,7 +6,7 @@ IS_NEW := -c 'import sys; sys.exit(sys.version_info < (3, 11))'
 PYTHON ?= $(shell for python in python3.11 python3; do "$$python" $(IS_NEW) 2> /dev/null && echo "$$python" && break; done)
 
 # Extras that are too large for the environment of `make test`, or exclude one another: each is tested in its own environment.
-HEAVY_ENGINES := mjx mujoco-warp newton sapien exudyn jsbsim genesis ode box3d rapier-js cannon-es jolt havok
+HEAVY_ENGINES := mjx mujoco-warp newton sapien exudyn jsbsim genesis brax ode box3d rapier-js cannon-es jolt havok
 # Packages of npm, which take the place of an extra.
 NPM_rapier-js := @dimforge/rapier3d-compat
 NPM_cannon-es := cannon-es

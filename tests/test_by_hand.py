@@ -15,6 +15,7 @@ PACKAGES = {
     "check_box3d.py": {"robox3d"},
     "check_jsbsim.py": {"jsbsim"},
     "check_genesis.py": {"genesis"},
+    "check_brax.py": {"brax", "jax"},
     "check_newton.py": {"newton", "warp"},
     "check_mjx.py": {"mujoco", "jax"},
     "check_mujoco_warp.py": {"mujoco", "mujoco_warp", "warp"},

@@ -60,6 +60,7 @@ BUILT_IN = {"wang": _Home(f"{FOLDER}.wang", "Wang")} | {
         ("mujoco-warp", "MuJoCoWarp", "mujoco_warp"),
         ("newton", "Newton", "newton"),
         ("genesis", "Genesis", "genesis"),
+        ("brax", "Brax", "brax"),
     )
 }
 CURES = {

@@ -35,7 +35,7 @@ ENGINES = (
         "quadrants",
         "torch",
     ),
-    *("mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang"),
+    *("brax", "mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang"),
 )
 STAMPED = (*MEASURING, *ENGINES)
 PACKAGES = tuple(Path(__file__).parents[2] / package for package in ("scenarios", "reference_impl", "comparisons"))

@@ -41,6 +41,7 @@ CASES = {
         Case("jsbsim[integrator=local-linearization]", 3.5e-7, None, batch=None),
     ],
     "genesis": [Case("genesis[precision=float64]", 8.35e-8, None)],
+    "brax": [Case("brax", 0.142, 2.5e-3, batch=32), Case("brax[pipeline=generalized]", 2.92e-4, None, batch=32)],
     "rapier-js": [Case("rapier-js", 2.8e-4, 1e-6, batch=None)],
     "cannon-es": [Case("cannon-es", 0.142, 1e-9, batch=None)],
     "jolt": [Case("jolt", 2.75e-4, 1e-6, batch=None)],

@@ -215,6 +215,7 @@ def test_labels_are_canonical_and_unknown_options_get_suggestions():
         "mujoco-warp",
         "newton",
         "genesis",
+        "brax",
     ]
     assert engine_names() == ["wang", "mujoco", "pybullet", *extras]
     with pytest.raises(DropspinError, match=r"engine 'mujco' is unknown\. Did you mean 'mujoco'"):

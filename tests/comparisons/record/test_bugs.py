@@ -102,7 +102,7 @@ def test_an_environment_that_cannot_be_made_is_named_and_not_kept(tmp_path, monk
 def test_a_bug_is_shown_by_the_installed_release(tmp_path):
     """The release that is installed needs no environment."""
     assert version("pybullet") in load_bugs(["pybullet-speed-limit"])[0].releases
-    done = dropspin("bugs", "pybullet-speed-limit", "brax-no-gyroscopic-term", "--json", cwd=tmp_path)
+    done = dropspin("bugs", "pybullet-speed-limit", "avian-gyroscopic-explosion", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     first, second = json.loads(done.stdout)
     assert first["value"] == pytest.approx(-0.96, abs=1e-9)

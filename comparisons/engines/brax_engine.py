@@ -1,0 +1,143 @@
+"""The engine `brax`: a free body in one of brax's pipelines, in double precision; scenes that differ in numbers alone compile once."""
+
+import warnings
+from collections.abc import Sequence
+from contextlib import redirect_stdout
+from functools import partial
+from io import StringIO
+from typing import Any, ClassVar
+
+import jax
+import numpy as np
+from jax import numpy as jnp
+
+from dropspin.comparisons.engines import mapping
+from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, OneWorld, Simulation
+from dropspin.comparisons.engines.mujoco_simulation import from_world
+from dropspin.comparisons.engines.packages import version
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.bodies import Sphere
+from dropspin.scenarios.model import initial_states
+
+with redirect_stdout(StringIO()):  # MJX prints that Warp is not installed, which it does not need
+    from brax.base import Inertia, Transform
+    from brax.generalized import pipeline as generalized
+    from brax.io import mjcf
+    from brax.spring import pipeline as spring
+
+jax.config.update("jax_enable_x64", True)  # for the whole process; each engine has one of its own
+PIPELINES = {"spring": spring, "generalized": generalized}
+CHUNK = 1000  # states that one call of the compiled function records at most
+REASONS = {
+    "elasticity": "the scene's restitution, of body and floor: brax takes the mean of both",
+    "baumgarte_erp": "0; the default, 0.1, adds a tenth of the penetration per step to the speed of a rebound",
+    "vel_damping": "minus the scene's decay rate",
+    "ang_damping": "as vel_damping",
+}
+
+
+class Brax(Engine):
+    """brax's free body, on a plane where the scene has a floor."""
+
+    name, compiles, order, reasons = "brax", True, 1.0, REASONS
+    shapes: ClassVar = ("sphere", "box")
+    choices: ClassVar = {"pipeline": tuple(PIPELINES)}
+
+    def declines(self, scene: Scenario) -> str | None:
+        pipeline, floor = self.option("pipeline"), scene.floor
+        if pipeline == "generalized":
+            soft = "contacts of brax's pipeline generalized are soft and have no coefficient of restitution"
+            return mapping.refusal_of_damped_axes(scene) if floor is None else soft
+        if floor is not None and scene.body.shape == "box":
+            return "brax's pipeline spring divides an impulse by the number of contacts: a cube that lands flat does not rebound"
+        return mapping.refusal_of_rest_speed(scene, "brax")
+
+    def prepare(self, scene: Scenario, dt: float) -> Simulation:
+        return OneWorld(scene, self.prepare_batch([scene], dt))
+
+    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> "Worlds":
+        return Worlds(members, dt, self.option("pipeline"))
+
+
+class Worlds(BatchSimulation):
+    """Worlds of one scene that one program steps together."""
+
+    def __init__(self, members: Sequence[Scenario], dt: float, pipeline: str) -> None:
+        self.velocity_lag, self._pipeline, scene = 0.5 * dt, pipeline, members[0]
+        chosen: dict[str, Any] = {"baumgarte_erp": 0.0, "elasticity": scene.floor.restitution} if scene.floor else {}
+        linear, angular = mapping.decay_rates(scene).values()
+        if scene.damping is not None and pipeline == "spring":
+            chosen |= {"vel_damping": -linear, "ang_damping": -angular}
+        with warnings.catch_warnings(action="ignore"):  # brax says that its pipelines are no longer maintained
+            system = mjcf.loads(description(scene, dt))
+        moments, axes = mapping.principal_frame(scene.body.inertia_tensor)
+        frame, mass = Transform(pos=np.zeros((1, 3)), rot=np.roll(axes, 1)[None]), np.array([scene.body.mass])
+        damping = np.repeat([linear * scene.body.mass, angular], 3) * [1.0, 1.0, 1.0, *moments]
+        link = system.link.replace(inertia=Inertia(frame, np.diag(moments)[None], mass))
+        parts = {"link": link, "dof": system.dof.replace(damping=damping), "mj_model": None}
+        values = {name: np.broadcast_to(value, np.shape(getattr(system, name))) for name, value in chosen.items()}
+        self._system = _typed(system.replace(**parts, **values))
+        self._state = _typed(_started(pipeline, self._system, from_world(initial_states(members))))
+        self._run(0, 0)  # compiles
+        made = {"version": version("brax"), "jax": jax.__version__, "mujoco-mjx": version("mujoco-mjx")}
+        self.settings = made | {"device": jax.devices()[0].device_kind} | chosen
+
+    def _run(self, count: int, every: int) -> Array:
+        """Take `count` times `every` steps; the states after each `every`, shape (count, size, 13)."""
+        self._state, rows = _recorded(self._pipeline, self._system, self._state, count, every)
+        return np.asarray(rows[:count], dtype=float)
+
+    def advance(self, steps: int) -> None:
+        self._run(1, steps)
+
+    def states(self) -> Array:
+        return np.asarray(_world(self._state), dtype=float)
+
+    def record(self, steps: int, every: int = 1) -> Array:
+        count, start = steps // every, self.states()
+        chunks = [self._run(min(CHUNK, count - done), every) for done in range(0, count, CHUNK)]
+        return np.concatenate([start[None], *chunks]).swapaxes(0, 1)
+
+    def as_built(self) -> AsBuilt:
+        inertia = self._system.link.inertia
+        return mapping.built(inertia.mass[0], np.diag(inertia.i[0]), np.roll(inertia.transform.rot[0], -1), self._system.gravity)
+
+
+def description(scene: Scenario, dt: float) -> str:
+    """A scene as MJCF; its mass and inertia are set later."""
+    plane, shape = "", ""
+    if scene.floor is not None and isinstance(scene.body, Sphere):
+        friction = f'friction="{min(scene.floor.coefficient, 1e6)!r} 0 0"'
+        plane = f'<geom type="plane" size="0 0 1" zaxis="0 1 0" {friction}/>'
+        shape = f'<geom type="sphere" size="{scene.body.radius!r}" {friction}/>'
+    options = f'<option timestep="{dt!r}" gravity="{" ".join(map(repr, scene.acceleration.tolist()))}"/>'
+    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    return f"<mujoco>{options}<worldbody>{plane}<body><freejoint/>{inertial}{shape}</body></worldbody></mujoco>"
+
+
+def _typed(tree: Any) -> Any:
+    """A tree of arrays with the types and the place of those that the compiled function returns, else its second call compiles again."""
+    return jax.device_put(jax.tree.map(np.asarray, tree), jax.devices()[0])
+
+
+@partial(jax.jit, static_argnums=0)
+def _started(pipeline: str, system: Any, rows: Any) -> Any:
+    return jax.vmap(lambda row: PIPELINES[pipeline].init(system, row[:7], row[7:]))(rows)
+
+
+def _world(state: Any) -> Any:
+    """States in the layout of dropspin, shape (size, 13)."""
+    return jnp.concatenate([state.x.pos, jnp.roll(state.x.rot, -1, axis=-1), state.xd.vel, state.xd.ang], axis=-1)[:, 0]
+
+
+@partial(jax.jit, static_argnums=0)
+def _recorded(pipeline: str, system: Any, state: Any, count: Any, every: Any) -> tuple[Any, Any]:
+    """The state after `count` times `every` steps, and the states after each `every`, in the first rows of (CHUNK, size, 13)."""
+    step = jax.vmap(partial(PIPELINES[pipeline].step, system, act=jnp.zeros(0)))
+
+    def advanced(row: Any, carried: Any) -> Any:
+        now = jax.lax.fori_loop(0, every, lambda _, state: step(state), carried[0])
+        return now, carried[1].at[row].set(_world(now))
+
+    start = _world(state)
+    return jax.lax.fori_loop(0, count, advanced, (state, jnp.zeros((CHUNK, *start.shape), start.dtype)))

@@ -54,7 +54,7 @@ def upright(height):
 def tumbling(name):
     """The change of the angular velocity in 0.5 s without torques, of unequal moments of inertia."""
     rows = motion(name, 0.5, upright(10.0), [0.0, 0.0, 0.0, 1.0, 2.0, 3.0], inertia=(1.0, 2.0, 2.9))
-    print(f"{name}: a tumbling body has the angular velocity {rows[-1, 6:]} rad/s instead of 1, 2, 3 rad/s at the start")
+    print(f"{name}: the angular velocity of a tumbling body changes from 1, 2, 3 rad/s to {rows[-1, 6:]} rad/s")
 
 
 def spinning():

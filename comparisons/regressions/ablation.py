@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from dropspin.comparisons.engines.registry import is_foreign, parsed
 from dropspin.comparisons.judging.verdicts import Judgement
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.regressions.attribution import changed_settings, common_settings
@@ -23,27 +24,34 @@ from dropspin.comparisons.running.start_phases import StartPhase
 from dropspin.scenarios import truth_for
 
 
-def with_explaining_settings(checked: Checked, baseline: Baseline | None) -> Checked:
+def with_explaining_settings(checked: Checked, baseline: Baseline | None, *, imports: bool) -> Checked:
     """A check with rows of kind `setting` for each engine of which settings changed since its results were accepted, and results fail.
 
     The engine simulates the scene of its largest change again, with the accepted values of these settings.
+
+    Args:
+        checked: The check.
+        baseline: The accepted results.
+        imports: Whether adapters outside dropspin are imported to do so. A run folder may come from anybody, and names its adapters.
     """
     if baseline is None:
         return checked
     results = checked.results
     failing = regressed(checked.changes)
     failing = failing[failing["kind"].isin(["truth", "invariant"]) & failing["value"].notna()]
-    rows = [row for _, first in failing.groupby("engine", sort=False).head(1).iterrows() for row in _rows(first, results, baseline)]
+    rows = [
+        row for _, first in failing.groupby("engine", sort=False).head(1).iterrows() for row in _rows(first, results, baseline, imports)
+    ]
     return (
         replace(checked, results=replace(results, table=pd.concat([results.table, as_table(rows)], ignore_index=True))) if rows else checked
     )
 
 
-def _rows(changed: "pd.Series[Any]", results: Results, baseline: Baseline) -> Iterator[Measurement]:
+def _rows(changed: "pd.Series[Any]", results: Results, baseline: Baseline, imports: bool) -> Iterator[Measurement]:
     """Rows for the settings of an engine that explain the change of a result."""
     label, scene, dt, metric = changed["engine"], results.scenes[changed["scene"]], float(changed["steps"]), METRICS[changed["metric"]]
     name = results.provenance["names"].get(label)  # none of an engine that was given as an object
-    engine = engine_entry(name).engine if name else None
+    engine = engine_entry(name).engine if name and (imports or not is_foreign(parsed(name)[0])) else None
     stamp = baseline.acceptances[changed["by"]].stamp_of(label)
     now, accepted = common_settings(results.provenance, label), changed_settings(stamp, results.provenance, label)
     back = {name: text for name, text in accepted.items() if engine and name in engine.settings and engine.unmet_need(name) is None}

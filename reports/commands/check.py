@@ -40,7 +40,7 @@ def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str 
     results = load_results(Path(run), arrays=False)
     accepted = None if baseline is None else load_baseline(baseline)
     try:
-        checked = with_explaining_settings(check(results, accepted), accepted)
+        checked = with_explaining_settings(check(results, accepted), accepted, imports=False)
     except DropspinError as error:
         raise DropspinError(f"{baseline}: {error} With --no-baseline, only the expectations of the scenes are checked.") from None
     document = story.document(checked, failures(checked.results, baseline), run, baseline)

@@ -99,7 +99,7 @@ def run_command(
         if not json_output:
             print_table(results, summary_only=not verbose)
         try:
-            checked = with_explaining_settings(check(results, accepted), accepted)
+            checked = with_explaining_settings(check(results, accepted), accepted, imports=True)
         except NothingAccepted as error:
             if json_output:
                 echo(json_text(results.table.to_dict("records")))

@@ -1,10 +1,12 @@
 """Settings that changed since results were accepted: the one that explains the change is named."""
 
 import datetime
+from dataclasses import replace
 
 import pytest
 
 from dropspin.comparisons.engines import pybullet_settings
+from dropspin.comparisons.regressions import ablation
 from dropspin.comparisons.regressions.ablation import with_explaining_settings
 from dropspin.comparisons.regressions.baseline import Baseline, load_baseline, write_baseline
 from dropspin.comparisons.regressions.checking import accept, check
@@ -21,7 +23,9 @@ def test_check_names_the_setting_of_the_adapter_that_changed_its_results(monkeyp
     write_baseline(accepted, tmp_path / "baseline.toml")
     accepted = load_baseline(tmp_path / "baseline.toml")
     again = run(ball, ["pybullet", "mujoco"], 4e-3)
-    assert with_explaining_settings(check(again, accepted), accepted).results.table.equals(check(again, accepted).results.table)
+    assert with_explaining_settings(check(again, accepted), accepted, imports=True).results.table.equals(
+        check(again, accepted).results.table
+    )
     for name, value in (("contactERP", 0.3), ("numSolverIterations", 400)):
         monkeypatch.setitem(pybullet_settings.WORLD, name, pybullet_settings.WORLD[name]._replace(calibrated=value))
     changed = run(ball, ["pybullet", "mujoco"], 4e-3)
@@ -29,7 +33,10 @@ def test_check_names_the_setting_of_the_adapter_that_changed_its_results(monkeyp
     [(engine, cause)] = checked.attributions
     assert (engine, cause.origin) == ("pybullet", "settings")
     assert "contactERP, numSolverIterations" in cause.message or "numSolverIterations, contactERP" in cause.message
-    rows = with_explaining_settings(checked, accepted).results.table.query("kind == 'setting'")
+    rows = with_explaining_settings(checked, accepted, imports=False).results.table.query("kind == 'setting'")
     assert dict(zip(rows["truth"], rows["value"], strict=True)) == {"contactERP=0.3": pytest.approx(1.0, abs=1e-6)}
-    [sentence] = settings_that_explain(with_explaining_settings(checked, accepted).results, "pybullet")
+    [sentence] = settings_that_explain(with_explaining_settings(checked, accepted, imports=False).results, "pybullet")
     assert sentence.startswith("drop-ball: contactERP=0.3 explains 100 % of the ")
+    named = replace(checked.results, provenance=checked.results.provenance | {"names": {"pybullet": "not_imported:Engine"}})
+    monkeypatch.setattr(ablation, "engine_entry", lambda name: pytest.fail(f"imported {name}"))
+    assert with_explaining_settings(replace(checked, results=named), accepted, imports=False).results.table.equals(named.table)

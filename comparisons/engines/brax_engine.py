@@ -19,7 +19,8 @@ from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.model import initial_states
 
-with redirect_stdout(StringIO()):  # MJX prints that Warp is not installed, which it does not need
+# MJX prints that Warp is not installed, which it does not need, and JAXopt warns that it is no longer maintained.
+with redirect_stdout(StringIO()), warnings.catch_warnings(action="ignore"):
     from brax.base import Inertia, Transform
     from brax.generalized import pipeline as generalized
     from brax.io import mjcf

@@ -78,8 +78,9 @@ class Worlds(BatchSimulation):
         parts = {"link": link, "dof": system.dof.replace(damping=damping), "mj_model": None}
         values = {name: np.broadcast_to(value, np.shape(getattr(system, name))) for name, value in chosen.items()}
         self._system = _typed(system.replace(**parts, **values))
-        self._state = _typed(_started(pipeline, self._system, from_world(initial_states(members))))
-        self._run(0, 0)  # compiles
+        with warnings.catch_warnings(action="ignore"):  # of MJX, about its data that brax reads
+            self._state = _typed(_started(pipeline, self._system, from_world(initial_states(members))))
+            self._run(0, 0)  # compiles
         made = {"version": version("brax"), "jax": jax.__version__, "mujoco-mjx": version("mujoco-mjx")}
         self.settings = made | {"device": jax.devices()[0].device_kind} | chosen
 

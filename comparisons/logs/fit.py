@@ -1,4 +1,4 @@
-"""Friction and restitution that engines need to continue the tosses of a recording, from the frames after the first contact."""
+"""The friction and restitution with which engines best match a recording, from the frames after the first contact of each toss."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -106,7 +106,7 @@ def log_fit(
     resources: ResourceLimits = FIVE_MINUTES,
     jobs: int | None = None,
 ) -> LogFit:
-    """Estimate the friction and the restitution of the floor that engines need to continue the tosses of a recording.
+    """Fit the coefficients of friction and restitution with which each engine best matches the tosses of a recording after their flight.
 
     Args:
         recording: A recording, the path of its header, or the flights found in it.

@@ -74,7 +74,9 @@ def sheet(problem):
     return "\n\n".join(parts) + "\n"
 
 
-EXACT = "An exact solution counts as correct if it differs from each printed value by at most one unit of the last printed digit. "
+EXACT = (
+    "A result counts as exact if each value differs from the printed one by at most one unit in the last decimal place of its quantity. "
+)
 TOLERANCE = """A numerical solution with the time step dt counts as correct if the absolute value of each metric in the table is within its
 bound. The bounds are the same for every engine, and the scene file gives a reason for each. [How results are
 computed](../figures.md) explains the metrics."""
@@ -94,8 +96,9 @@ def _solution(scene, truth):
         return ["No exact solution is known."]
     return [
         f"The solution is computed {KINDS[truth.name]}: {truth.statement}.",
-        f"The table gives the state at four times. The components of each quantity (x, q, v and ω) have as many decimals as give the "
-        f"largest of them {DIGITS} significant digits; a component that rounds to 0 is written as 0.",
+        f"The table gives the state at four times. All components of a quantity (x, q, v or ω) have the same number of decimals: that with "
+        f"which the largest of them, over all times of the table, has {DIGITS} significant digits. A component that rounds to 0 is written as "
+        "0.",
         _states(scene, truth),
         *_impacts(scene, truth),
         *_horizon(scene, truth),

@@ -11,8 +11,8 @@ dq/dt = ½ [ω, 0] q. q and −q are the same orientation; the tables give the o
 world frame, and L = I ω is the angular momentum about the centre of mass."""
 
 FLIGHT = "In flight, dv/dt = g and dL/dt = 0."
-IMPACT = """The body is in flight until one of its points reaches the floor while moving down. An impact takes no time and does not
-change x and q. An impulse j acts at this point; it changes v by j/M and ω by I⁻¹ (r × j), where r is the position of the point relative to
+IMPACT = """The body is in flight until one of its points reaches the floor while moving down. An impact takes no time and changes
+neither x nor q. An impulse j acts at this point; it changes v by j/M and ω by I⁻¹ (r × j), where r is the position of the point relative to
 the centre of mass. u = v + ω × r is the velocity of the point."""
 SMOOTH = """The floor has no friction, so j is vertical. Its size is such that u_y becomes -e u_y (Newton's restitution). The horizontal
 components of u may change too."""

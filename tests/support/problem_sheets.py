@@ -97,8 +97,8 @@ def _solution(scene, truth):
     return [
         f"The solution is computed {KINDS[truth.name]}: {truth.statement}.",
         f"The table gives the state at four times. All components of a quantity (x, q, v or ω) have the same number of decimals: that with "
-        f"which the largest of them, over all times of the table, has {DIGITS} significant digits. A component that rounds to 0 is written as "
-        "0.",
+        f"which the largest of them, over all times of the table, has {DIGITS} significant digits. A component that rounds to 0 is "
+        "written as 0.",
         _states(scene, truth),
         *_impacts(scene, truth),
         *_horizon(scene, truth),

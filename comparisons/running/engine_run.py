@@ -58,7 +58,13 @@ class EngineRun:
 
 
 def run_engine(
-    entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario], quick: bool, on_simulations: OnSimulations = share_progress
+    entry: EngineEntry,
+    scene: Scenario,
+    dt: float,
+    starts: Sequence[Scenario],
+    quick: bool,
+    perturbs: bool,
+    on_simulations: OnSimulations = share_progress,
 ) -> EngineRun:
     """Run a scene from its own start, then from each of its start phases if there are several; failures are part of the result.
 
@@ -68,13 +74,14 @@ def run_engine(
         dt: Time step [s].
         starts: The scene from each of its start phases.
         quick: Whether perturbed starts are run only where verdicts need them, in single precision, and few members of an ensemble.
+        perturbs: Whether perturbed starts are run at all; they give the uncertainty of an error, not its value.
         on_simulations: Called after each simulation.
     """
     engine, found = entry.adapter, EngineRun(entry.label)
     try:
         verify_accepted(engine, scene)
         found.discretisation, found.order, found.precision = verified_claims(engine, scene)
-        sets = [] if quick and found.precision is np.float64 else perturbed(scene, starts, found.precision)
+        sets = perturbed(scene, starts, found.precision) if perturbs and not (quick and found.precision is np.float64) else []
         others = [*(starts if len(starts) > 1 else []), *chain(*sets)]
         size = 0 if scene.recording is None else len(starts) // PHASES_OF_TOSS
         drawn = size and size * simulations_of(size)

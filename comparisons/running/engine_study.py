@@ -93,7 +93,7 @@ class EngineStudy:
         return cases
 
     def _measured(
-        self, entry: EngineEntry, phases: Sequence[StartPhase], progress: Progress, timing: Timing
+        self, entry: EngineEntry, phases: Sequence[StartPhase], progress: Progress, timing: Timing, *, perturbs: bool = True
     ) -> tuple[Outcome, list[Comparison]]:
         """Simulate the scene from all start phases, and measure every metric."""
         scene, dt, run = self.own.scene, progress.dt, EngineRun(entry.label)
@@ -103,7 +103,7 @@ class EngineStudy:
             def on_simulations(done: int, total: int) -> None:
                 self.on_progress(progress._replace(done=done, total=total))
 
-            answer = self.processes.call(entry, run_engine, scene, dt, starts, self.own.quick, on_simulations=on_simulations)
+            answer = self.processes.call(entry, run_engine, scene, dt, starts, self.own.quick, perturbs, on_simulations=on_simulations)
             run = EngineRun(entry.label, answer) if isinstance(answer, Breakdown) else answer
         motions = [] if run.motion is None else [run.motion, *run.phases]
         run.breakdown = run.breakdown or timing.breakdown or next(filter(None, map(divergence, motions)), None)
@@ -168,7 +168,7 @@ class EngineStudy:
 
         def error(engine: Engine) -> float:
             progress = Progress(self.own.scene.name, self.entry.label, dt, added=True)
-            outcome, _ = self._measured(engine_entry(engine), phases, progress, Timing())
+            outcome, _ = self._measured(engine_entry(engine), phases, progress, Timing(), perturbs=False)
             return outcome.points[metric.name].average.value if metric.name in outcome.points else math.nan
 
         return error

@@ -28,7 +28,7 @@ def prepared(name, quick=False):
 def test_simulations_are_those_that_a_run_does(name, quick):
     own, entry, totals = prepared(name, quick), engine_entry("wang"), []
     starts = [phase.scene for phase in start_phases(own.scene, own.truth, DT, quick=quick)]
-    done = run_engine(entry, own.scene, DT, starts, quick, lambda _, total: totals.append(total))
+    done = run_engine(entry, own.scene, DT, starts, quick, True, lambda _, total: totals.append(total))
     assert simulations(own, entry, DT) == totals[-1] + (0 if done.outcome is None else len(done.outcome.rebound))
 
 

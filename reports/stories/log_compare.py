@@ -9,6 +9,7 @@ from dropspin.comparisons.logs.compare import Error, LogComparison, Pair
 from dropspin.comparisons.logs.log import Finding
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.plots.chart import Chart
+from dropspin.reports.plots.colours import in_sentence
 from dropspin.reports.plots.intervals import Interval, interval_rows
 from dropspin.reports.stories.log_findings import corrections
 from dropspin.reports.stories.numbers import formatted, grouped, left_out
@@ -83,8 +84,12 @@ def _pair_chart(quantity: str, pairs: Sequence[Pair]) -> Chart:
     """The differences between engines."""
     scale, unit = OF[quantity]
     shown = [pair for pair in pairs if pair.quantity == quantity]
-    rows = [Interval(_label(pair), scale * pair.difference, scale * pair.lower, scale * pair.upper, 0.0) for pair in shown]
+    rows = [Interval(_named(pair), scale * pair.difference, scale * pair.lower, scale * pair.upper, 0.0) for pair in shown]
     return interval_rows(f"difference of {quantity}{unit}", rows, "no difference")
+
+
+def _named(pair: Pair) -> str:
+    return f"{in_sentence(pair.first)} − {in_sentence(pair.second)}"
 
 
 def _label(pair: Pair) -> str:

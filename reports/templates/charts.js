@@ -62,8 +62,8 @@
     return linearTicks([10 ** low, 10 ** high], 4).filter(([value]) => value > 0).map(([value]) => [Math.log10(value), shown(value, 2)]);
   };
 
-  // The label of a row: a long one has a line for the engine and one for each option.
-  const linesOf = (text) => (text.length > 22 ? text.split(/(?<=,) /) : [text]);
+  // The label of a row: a long one has a line for each engine and one for each option.
+  const linesOf = (text) => (text.length > 22 ? text.split(/(?<=,) | (?=[−(])/) : [text]);
 
   class Chart {
     constructor(home, raw, section, engines) {

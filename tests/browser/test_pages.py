@@ -395,7 +395,7 @@ def test_report_is_smaller_than_100_kb_a_scene(folder, results):
 
 def test_png_of_every_kind_of_plot_has_ink_and_none_at_its_edges(tmp_path, few_start_phases):
     scenes = map(with_few_members, ["drop-ball", "drop-box-anyhow", "spin-asymmetric"])
-    made = ds.write_report(ds.run(scenes, ENGINES), tmp_path / "run").parent
+    made = ds.write_report(ds.run(scenes, ENGINES, [1.6e-2, 8e-3, 4e-3]), tmp_path / "run").parent
     assert dropspin("report", made, "--plots", "png", "--plots", "svg", cwd=tmp_path).returncode == 0
     drawn = sorted(made.glob("plots/*.png"))
     assert [file.stem for file in drawn] == sorted(file.stem for file in made.glob("plots/*.svg"))

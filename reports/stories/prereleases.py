@@ -24,7 +24,7 @@ def prereleases(measured: Mapping[str, Sequence[Release]]) -> Note:
     parts = [part for engine, sentences in changed.items() for part in _of_engine(engine, compared[engine], sentences)]
     alike = [f"{engine}: no result changed from {_names(compared[engine])}." for engine in compared if engine not in changed]
     missing = [f"Without a prerelease after the newest release: {', '.join(engine for engine in measured if engine not in compared)}."]
-    title = f"Changes in {len(changed)} of {counted(len(compared), 'engine')} with a prerelease"
+    title = f"Changes in {len(changed)} of {counted(len(compared), 'compared engine')}"
     return Note(Document(title, [*parts, Sentences(alike + (missing if len(compared) < len(measured) else []))]), bool(changed))
 
 

@@ -30,7 +30,7 @@ def test_newest_prerelease_is_compared_with_the_newest_release(values, tmp_path)
     done = dropspin("record", "--pre", "-o", "own", cwd=tmp_path)
     assert done.returncode == 1
     note = (tmp_path / "own/prereleases.md").read_text()
-    assert note.startswith("## Changes in 1 of 1 engine with a prerelease\n")
+    assert note.startswith("## Changes in 1 of 1 compared engine\n")
     assert "mujoco, from 1.1.0 to 1.2.0rc1" in note
     assert "spin-asymmetric with mujoco: orientation error 0.0127 → 1.00e-06 rad" in note.replace("\xa0", " ")
     assert "`dropspin record --pre -e mujoco --release 1.1.0 --release 1.2.0rc1`" in note

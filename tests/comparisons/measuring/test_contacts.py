@@ -10,6 +10,7 @@ from support.engines import CORE, QUICK
 
 import dropspin as ds
 from dropspin import scenarios
+from dropspin.comparisons.measuring.batch import compute_cases
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.contacts import RESIDUALS
 from dropspin.comparisons.measuring.requirements import obeys_contact_laws
@@ -69,6 +70,20 @@ def sliding(scene, direction, acceleration, spin_acceleration=0.0):
     half = 0.5 * np.cumsum(states[:, 11]) * DT
     states[:, 4], states[:, 6] = np.sin(half), np.cos(half)
     return Trajectory.from_states(t, states)
+
+
+@pytest.mark.parametrize("excess", [(0.0, 0.2, 0.0), (0.2, 0.0, 0.1)])
+def test_motions_measured_together_have_their_own_residuals(excess):
+    """Each of several boxes that slide side by side has the friction of its own motion, and so the bits that it has alone."""
+    along = np.array([1.0, 0.0, 0.0])
+    scene = box(F, velocity=V * along)
+    together = [Comparison(scene, sliding(scene, along, -F * G * (1.0 + share))) for share in excess]
+    compute_cases(together)
+    for case, share in zip(together, excess, strict=True):
+        alone = Comparison(scene, case.motion).contacts
+        assert (np.nanmax(case.contacts.cone_excess) > 1e-6) == (share > 0.0)
+        for name in ("steps", "in_contact", *RESIDUALS):
+            np.testing.assert_array_equal(getattr(case.contacts, name), getattr(alone, name))
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, 2.0])

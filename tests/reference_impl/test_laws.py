@@ -74,8 +74,8 @@ def test_energy_gain_of_the_note_s_law_has_the_known_supremum(mu, solid, frictio
     assert -found.fun <= supremum(mu, 7 if solid else 3, friction == STICKS) * (1 + 1e-9)
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("law", ["normal", "poisson", "clamped"])
+@pytest.mark.sample(2)  # with friction or without, of the law whose limit on friction depends on the energy
+@pytest.mark.parametrize("law", ["clamped", "normal", "poisson"])
 @pytest.mark.parametrize("friction", [0.0, STICKS])
 def test_law_never_adds_energy(law, friction):
     """100,000 random impacts, inertia ratios to 1e3: at most 1e-12 more energy than before (measured 3e-15)."""

@@ -54,7 +54,7 @@ class Setting(NamedTuple):
         most: The largest allowed value.
         values: The allowed words; if there are two, the first means off.
         is_computed: Whether the calibrated value is computed from the scene and the time step.
-        needs: Other options that must have a certain value for this setting to have an effect, with this value.
+        needs: Other options that must have certain values for this setting to have an effect: each with these values.
     """
 
     default: Value
@@ -66,7 +66,7 @@ class Setting(NamedTuple):
     most: float = math.inf
     values: tuple[str, ...] = ()
     is_computed: bool = False
-    needs: tuple[tuple[str, str], ...] = ()
+    needs: tuple[tuple[str, ...], ...] = ()
 
     @property
     def allowed(self) -> str:
@@ -146,9 +146,9 @@ class Configured:
         )
         for setting in self.given:
             if (unmet := self.unmet_need(setting)) is not None:
-                option, value = unmet
-                actual = f"{option}={self.option(option)}"
-                raise DropspinError(f"engine {self.label!r}: {setting} has no effect with {actual}; it needs {option}={value}.")
+                other, *needed = unmet
+                actual, wanted = f"{other}={self.option(other)}", " or ".join(f"{other}={value}" for value in needed)
+                raise DropspinError(f"engine {self.label!r}: {setting} has no effect with {actual}; it needs {wanted}.")
         for option in self.representations:
             self._verify_known("representation", option, self.choices)
         for option, values in self.accuracy.items():
@@ -210,9 +210,9 @@ class Configured:
         """The values of the settings that were given explicitly."""
         return {name: self.settings[name].parsed(text) for name, text in self.options.items() if name in self.settings}
 
-    def unmet_need(self, setting: str) -> tuple[str, str] | None:
-        """An option and the value that it must have for a setting to have an effect; None if the setting has an effect."""
-        return next((need for need in self.settings[setting].needs if self.option(need[0]) != need[1]), None)
+    def unmet_need(self, setting: str) -> tuple[str, ...] | None:
+        """An option and the values with which a setting would have an effect; None if the setting has an effect."""
+        return next((need for need in self.settings[setting].needs if self.option(need[0]) not in need[1:]), None)
 
     @property
     def is_default(self) -> bool:
@@ -233,7 +233,7 @@ class Configured:
         """The same engine without some of its options, and without settings that then have no effect."""
         left = {name: text for name, text in self.options.items() if name not in names}
         needs = {name: self.settings[name].needs for name in left if name in self.settings}
-        acting = {name for name in needs if all(left.get(option, self._default(option)) == value for option, value in needs[name])}
+        acting = {name for name in needs if all(left.get(option, self._default(option)) in values for option, *values in needs[name])}
         return replace(self, options={name: text for name, text in left.items() if name not in needs or name in acting})
 
     @property

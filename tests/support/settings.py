@@ -24,7 +24,7 @@ def verify_settings_are_in_force(name: str, scene: Scenario) -> None:
     assert settings
     for option, setting in settings.items():
         value = other_value(setting)
-        needs = "".join(f",{other}={needed}" for other, needed in setting.needs)
+        needs = "".join(f",{other}={needed}" for other, needed, *_ in setting.needs)
         with engine(f"{name}[{option}={value}{needs}]").prepare(scene, 1e-3) as simulation:
             simulation.advance(1)
             has = simulation.settings.get(option, setting.default)

@@ -8,6 +8,8 @@ from exudyn import utilities as items
 from scipy.spatial.transform import Rotation
 
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
+from dropspin.comparisons.engines.mapping import PROFILES
+from dropspin.comparisons.engines.options import Setting, calibrated_values
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import Array
@@ -21,21 +23,45 @@ INTEGRATORS = {
 }
 """The name of Exudyn's solver, and its order, by the option `integrator`."""
 OUTPUTS = [getattr(exu.OutputVariableType, name) for name in ("Position", "RotationMatrix", "Velocity", "AngularVelocity")]
-REASONS = {
-    "adaptiveStep": "never divides a step; a step that does not converge ends the simulation",
-    "relativeTolerance": "of an implicit step's residual; with the defaults, 1e-8 and 1e-10, the motion depends on the units, by 4e-6",
-    "absoluteTolerance": "as relativeTolerance",
-    "spectralRadius": "Exudyn's own, of generalized-alpha alone; at 1 it makes the errors of trapezoidal, which differ by 0.5 %",
-    "damping": "N s/m, and N m s in the body's axes: m c and I c, which give the scene's decay",
+IMPLICIT = (("integrator", "generalized-alpha", "trapezoidal"),)
+TIME = {"adaptiveStep": Setting(True, "divides a step that fails", False, "never divides a step; one that fails ends the simulation")}
+NEWTON = {
+    "relativeTolerance": Setting(
+        1e-8,
+        "by which Newton's method decreases the residual of a step",
+        1e-13,
+        "of an implicit step's residual; with the defaults, 1e-8 and 1e-10, the motion depends on the units, by 4e-6",
+        needs=IMPLICIT,
+    ),
+    "absoluteTolerance": Setting(1e-10, "residual at which Newton's method ends", 0.0, "as relativeTolerance", needs=IMPLICIT),
+    "maxIterations": Setting(25, "of Newton's method", least=1, needs=IMPLICIT),
+    "useModifiedNewton": Setting(True, "keeps the Jacobian between steps", needs=IMPLICIT),
 }
-"""Effects were measured on tumbling bodies at 1 ms, without the one setting."""
+ALPHA = {
+    "spectralRadius": Setting(
+        0.9,
+        "of fast motion in a step: 1 for no damping",
+        why="Exudyn's own; at 1 it makes the errors of trapezoidal, which differ by 0.5 %",
+        most=1.0,
+        needs=(("integrator", "generalized-alpha"),),
+    ),
+    "lieGroupSimplifiedKinematicRelations": Setting(False, "rotations as of 2010, less accurate", needs=IMPLICIT),
+    "computeInitialAccelerations": Setting(True, "computes the accelerations at the start, else 0", needs=IMPLICIT),
+    "newmarkBeta": Setting(0.25, "of Newmark's method", needs=(("integrator", "trapezoidal"),)),
+    "newmarkGamma": Setting(0.5, "of Newmark's method", needs=(("integrator", "trapezoidal"),)),
+}
+SETTINGS = TIME | NEWTON | ALPHA
+"""By the names in Exudyn's `timeIntegration`, its `newton` and its `generalizedAlpha`. Effects were measured on tumbling bodies at 1 ms."""
+REASONS = {"damping": "N s/m, and N m s in the body's axes: m c and I c, which give the scene's decay"}
+REASONS |= {name: setting.why for name, setting in SETTINGS.items() if setting.why}
 
 
 class Exudyn(Engine):
     """Exudyn's rigid body without contacts."""
 
     name, reasons = "exudyn", REASONS
-    choices: ClassVar = {"integrator": tuple(INTEGRATORS)}
+    choices: ClassVar = {"profile": PROFILES, "integrator": tuple(INTEGRATORS)}
+    settings: ClassVar = SETTINGS
 
     @property
     def order(self) -> float:  # type: ignore[override]  # it depends on the option
@@ -47,13 +73,13 @@ class Exudyn(Engine):
         return "Exudyn's contacts are springs: with restitution 0.5 a ball rebounds with 0.481 or 0.498, by their stiffness"
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return ExudynSimulation(scene, dt, INTEGRATORS[self.option("integrator")][0])
+        return ExudynSimulation(scene, dt, self)
 
 
 class ExudynSimulation(Simulation):
     """A system of one body, and a solver that takes one step a call."""
 
-    def __init__(self, scene: Scenario, dt: float, solver: str) -> None:
+    def __init__(self, scene: Scenario, dt: float, engine: Exudyn) -> None:
         start, inertia, mass = scene.start, scene.body.inertia_tensor, scene.body.mass
         self._container = exu.SystemContainer()  # holds the system
         self._system = self._container.AddSystem()
@@ -72,21 +98,23 @@ class ExudynSimulation(Simulation):
             damping = {"linear": scene.damping.linear * mass * np.eye(3), "angular": scene.damping.angular * inertia}
             self._damp(**damping)
         self._system.Assemble()
+        solver, _ = INTEGRATORS[engine.option("integrator")]
         is_implicit = solver in ("GeneralizedAlpha", "TrapezoidalIndex2")
-        newton = {"relativeTolerance": 1e-13, "absoluteTolerance": 0.0} if is_implicit else {}
-        chosen = {"numberOfSteps": 1, "endTime": dt, "adaptiveStep": False}
         self._options = exu.SimulationSettings()
         self._options.solution.file.write = False
         time, alpha = self._options.timeIntegration, self._options.timeIntegration.generalizedAlpha
-        for table, values in ((time, chosen), (time.newton, newton)):
-            for name, value in values.items():
-                setattr(table, name, value)
-        time.solverType = getattr(exu.DynamicSolverType, solver)
+        time.numberOfSteps, time.endTime, time.solverType = 1, dt, getattr(exu.DynamicSolverType, solver)
         alpha.useNewmark = alpha.useIndex2Constraints = solver == "TrapezoidalIndex2"
+        chosen = ({} if engine.is_default else calibrated_values(SETTINGS)) | engine.given
+        in_force = {}
+        for table, names in ((time, TIME), (time.newton, NEWTON), (alpha, ALPHA)):
+            for name in names:
+                if engine.unmet_need(name) is None:
+                    setattr(table, name, chosen.get(name, getattr(table, name)))
+                    in_force[name] = getattr(table, name)
         self._solver = exu.MainSolverImplicitSecondOrder() if is_implicit else exu.MainSolverExplicit()
         self._solver.InitializeSolver(self._system, self._options)
-        self.settings = {"version": version("exudyn"), "solverType": solver, **chosen, **newton}
-        self.settings |= {"spectralRadius": alpha.spectralRadius} if solver == "GeneralizedAlpha" else {}
+        self.settings = {"version": version("exudyn"), "profile": engine.option("profile"), "solverType": solver, **in_force}
         self.settings |= {"damping": {motion: rates.tolist() for motion, rates in damping.items()}} if damping else {}
 
     def _damp(self, linear: Array, angular: Array) -> None:

@@ -4,7 +4,7 @@ The laws of motion hold in any consistent units, so JSBSim's feet, slugs and pou
 """
 
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
@@ -14,6 +14,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
+from dropspin.comparisons.engines.mapping import PROFILES
+from dropspin.comparisons.engines.options import Setting
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import Array
@@ -29,7 +31,17 @@ INTEGRATORS = {
     "local-linearization": ((AB2, LOCAL, AB2, AB2), 2.0),
 }
 """JSBSim's numbers of the methods of `METHODS`, and the order that they have together, by the option `integrator`."""
-METHODS = [f"simulation/integrator/{of}/{motion}" for motion in ("rotational", "translational") for of in ("rate", "position")]
+OF_VECTORS, OF_ROTATIONS = ("0", "1", "2", "3", "4", "5", "9"), tuple(map(str, range(10)))
+WHAT = "number of the method: 0 none, 1 Euler, 2 trapezoidal, 3 to 5 and 9 Adams-Bashforth"
+METHODS = {
+    "simulation/integrator/rate/rotational": Setting("1", WHAT, values=OF_VECTORS, is_computed=True),
+    "simulation/integrator/position/rotational": Setting(
+        "1", f"{WHAT}, 6 and 7 Buss, 8 local linearization", values=OF_ROTATIONS, is_computed=True
+    ),
+    "simulation/integrator/rate/translational": Setting("3", WHAT, values=OF_VECTORS, is_computed=True),
+    "simulation/integrator/position/translational": Setting("4", WHAT, values=OF_VECTORS, is_computed=True),
+}
+"""Set by the option `integrator`."""
 CENTRE = np.array([1.0, 1.0, 1.0]) / 3.0  # m, of the planet; JSBSim divides by the distance from it, which is hardly ever 0 there
 POUNDS = 32.174049  # JSBSim's weight of a slug; it takes the weight as the mass
 STATE = [*(f"position/eci-{axis}-ft" for axis in "xyz"), *(f"velocities/eci-{axis}-fps" for axis in "xyz")]
@@ -51,7 +63,8 @@ class JSBSim(Engine):
     """JSBSim's rigid body in flight."""
 
     name, reasons = "jsbsim", {"damping": "N s/m, and N m s in the body's axes: m c and I c, which give the scene's decay"}
-    choices: ClassVar = {"integrator": tuple(INTEGRATORS)}
+    choices: ClassVar = {"profile": PROFILES, "integrator": tuple(INTEGRATORS)}
+    settings: ClassVar = METHODS
 
     @property
     def order(self) -> float:  # type: ignore[override]  # it depends on the option
@@ -61,7 +74,8 @@ class JSBSim(Engine):
         return None if scene.floor is None else "JSBSim's ground contacts are the springs and dampers of a landing gear"
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return JSBSimSimulation(scene, dt, INTEGRATORS[self.option("integrator")][0])
+        methods = dict(zip(METHODS, map(str, INTEGRATORS[self.option("integrator")][0]), strict=True)) | self.given
+        return JSBSimSimulation(scene, dt, {"profile": self.option("profile")} | methods)
 
 
 def elements(values: Array, names: Iterable[str] = "xyz") -> str:
@@ -100,9 +114,9 @@ def damping_xml(linear: float, angular: Array) -> str:
 class JSBSimSimulation(Simulation):
     """A JSBSim executive."""
 
-    def __init__(self, scene: Scenario, dt: float, methods: tuple[int, ...]) -> None:
+    def __init__(self, scene: Scenario, dt: float, chosen: Mapping[str, str]) -> None:
         start, damping, mass, inertia = scene.start, scene.damping, scene.body.mass, scene.body.inertia_tensor
-        self.settings = {"version": version("jsbsim")} | dict(zip(METHODS, methods, strict=True))
+        self.settings = {"version": version("jsbsim"), **chosen}
         drag = ""
         if damping is not None:
             linear, angular = damping.linear * mass, damping.angular * inertia
@@ -124,7 +138,7 @@ class JSBSimSimulation(Simulation):
             executive.get_ic().load(f"{folder}/start.xml", False)
         executive.set_dt(dt)
         weight = {"external_reactions/gravity/magnitude": mass * float(np.linalg.norm(scene.acceleration))}
-        for name, number in (weight | {"simulation/gravity-model": 0} | dict(zip(METHODS, methods, strict=True))).items():
+        for name, number in (weight | {"simulation/gravity-model": 0} | {name: int(chosen[name]) for name in METHODS}).items():
             executive[name] = number
         executive.run_ic()
         self._start, self._first = np.array(start.position), self._read(STATE[:3])

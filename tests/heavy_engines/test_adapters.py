@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import cli
 from support.findings import verify_findings
-from support.settings import verify_settings_are_in_force
+from support.settings import verify_defaults_are_in_force, verify_settings_are_in_force
 
 from dropspin import scenarios
 from dropspin.comparisons.conformance.checks import CHECKS
@@ -77,6 +77,11 @@ def test_state_has_the_precision_that_is_claimed(case):
 def test_engine_has_each_setting_that_is_given(case):
     if engine(case.label).settings:
         verify_settings_are_in_force(engine(case.label).name, scenarios.load("slide-box"))
+
+
+def test_default_profile_has_the_defaults_that_are_listed(case):
+    if "profile" in engine(case.label).choices:
+        verify_defaults_are_in_force(engine(case.label).name, scenarios.load("slide-box"))
 
 
 def test_findings_of_the_page_on_engines_are_measured(finding, tmp_path):

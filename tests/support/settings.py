@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from dropspin.comparisons.engines.options import Setting, spelled
+from dropspin.comparisons.engines.options import Setting, Value, spelled
 from dropspin.comparisons.engines.registry import engine
 from dropspin.scenarios import Scenario
 
@@ -27,8 +27,20 @@ def verify_settings_are_in_force(name: str, scene: Scenario) -> None:
         needs = "".join(f",{other}={needed}" for other, needed, *_ in setting.needs)
         with engine(f"{name}[{option}={value}{needs}]").prepare(scene, 1e-3) as simulation:
             simulation.advance(1)
-            has = simulation.settings.get(option, setting.default)
-        if isinstance(has, str | bool):
-            assert spelled(has) == value, option
-        else:
-            np.testing.assert_allclose(has, [float(part) for part in value.split()], rtol=1e-6, err_msg=option)
+            _verify_equal(simulation.settings.get(option, setting.default), value, option)
+
+
+def verify_defaults_are_in_force(name: str, scene: Scenario) -> None:
+    """With profile=default, an engine has the default of each setting that does not follow from the scene, as those of the floor do."""
+    chosen = engine(f"{name}[profile=default]")
+    with chosen.prepare(scene, 1e-3) as simulation:
+        for option, setting in chosen.settings.items():
+            if option in simulation.settings and not setting.is_computed and not option.startswith("floor_"):
+                _verify_equal(simulation.settings[option], spelled(setting.default), option)
+
+
+def _verify_equal(has: Value, expected: str, option: str) -> None:
+    if isinstance(has, str | bool):
+        assert spelled(has) == expected, option
+    else:
+        np.testing.assert_allclose(has, [float(part) for part in expected.split()], rtol=1e-6, err_msg=option)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from support.settings import verify_settings_are_in_force
+from support.settings import verify_defaults_are_in_force, verify_settings_are_in_force
 
 from dropspin.comparisons.engines.mujoco_settings import SETTINGS, in_force
 from dropspin.comparisons.engines.options import spelled
@@ -83,6 +83,7 @@ def test_mujocos_defaults_are_those_of_the_library():
 def test_engine_has_what_was_given(name):
     """Another value of each setting, in force as read from the model."""
     verify_settings_are_in_force(name, load("slide-box"))
+    verify_defaults_are_in_force(name, load("slide-box"))
 
 
 def test_pybullets_defaults_are_those_of_the_library():

@@ -14,7 +14,7 @@ import numpy as np
 from jax import numpy as jnp
 
 from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, KnownLimitation, Simulation
-from dropspin.comparisons.engines.mapping import built
+from dropspin.comparisons.engines.mapping import PROFILES, built
 from dropspin.comparisons.engines.mujoco_engine import MuJoCo, flight_of
 from dropspin.comparisons.engines.mujoco_limitations import limitations_met
 from dropspin.comparisons.engines.mujoco_ports import SETTINGS, Port, ported_model
@@ -34,7 +34,7 @@ class MJX(Port):
     """MJX's free body and, where the scene has a floor, one contact pair."""
 
     name, mixes_scenes = "mjx", True
-    choices: ClassVar = {"precision": ("float32", "float64"), "integrator": ("euler", "implicitfast", "rk4")}
+    choices: ClassVar = {"profile": PROFILES, "precision": ("float32", "float64"), "integrator": ("euler", "implicitfast", "rk4")}
 
     @property
     def precision(self) -> type:  # type: ignore[override]  # it depends on the option
@@ -45,11 +45,11 @@ class MJX(Port):
         """MuJoCo's, but the gyroscopic term is explicit in `implicitfast` too, and RK4's rotations are those of MuJoCo before 4.0."""
         if self.option("integrator") == "rk4":
             return flight_of("rk4", numbers_of(version("mujoco-mjx"))) if self.is_calibrated else None
-        return MuJoCo({name: text for name, text in self.options.items() if name in SETTINGS}).discretisation(scene)
+        return MuJoCo({name: text for name, text in self.options.items() if name in ("profile", *SETTINGS)}).discretisation(scene)
 
     def declines(self, scene: Scenario) -> str | None:
         recomputed = self.option("integrator") == "implicitfast" or scene.damping is not None
-        if scene.floor is not None and recomputed and self.precision is np.float32:
+        if scene.floor is not None and recomputed and self.precision is np.float32 and not self.is_default:
             return (
                 "with damping or implicitfast, MJX computes accelerations from contact forces, whose rounding errors in single precision "
                 "change a rebound by up to 2e-3; use precision=float64"

@@ -9,9 +9,9 @@ from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.mapping import refusal_of_damped_axes
 from dropspin.comparisons.engines.mujoco_engine import REASONS as MUJOCO_REASONS
 from dropspin.comparisons.engines.mujoco_engine import MuJoCo
-from dropspin.comparisons.engines.mujoco_model import FORM, calibrated_specification, contact
+from dropspin.comparisons.engines.mujoco_model import FORM, calibrated_specification, contact, default_specification
 from dropspin.comparisons.engines.mujoco_settings import SETTINGS as MUJOCO_SETTINGS
-from dropspin.comparisons.engines.mujoco_settings import set_in
+from dropspin.comparisons.engines.mujoco_settings import in_force, set_in
 from dropspin.comparisons.engines.mujoco_simulation import set_damping
 from dropspin.scenarios import Scenario
 
@@ -27,12 +27,15 @@ REASONS = {name: MUJOCO_REASONS[name] for name in ("solref", "solimp", "solreffr
 
 OF_CONTACTS = ("friction", "solref", "solimp", "solreffriction", "cone", "impratio")
 OF_SOLVER = ("iterations", "tolerance", "ls_iterations", "ls_tolerance")
-SETTINGS = {name: MUJOCO_SETTINGS[name]._replace(needs=()) for name in (*OF_CONTACTS, *OF_SOLVER, "density", "viscosity", "armature")}
-"""MuJoCo's settings that its ports have."""
+OF_PROFILES = {name: tuple(need for need in setting.needs if need[0] == "profile") for name, setting in MUJOCO_SETTINGS.items()}
+SETTINGS = {
+    name: MUJOCO_SETTINGS[name]._replace(needs=OF_PROFILES[name]) for name in (*OF_CONTACTS, *OF_SOLVER, "density", "viscosity", "armature")
+}
+"""MuJoCo's settings that its ports have, which lack the options `kappa` and `spring_steps`."""
 
 
 class Port(Engine):
-    """A port of MuJoCo with the option `integrator`: it claims and declines what MuJoCo does, unless it says otherwise."""
+    """A port of MuJoCo with the options `integrator` and `profile`: it claims and declines what MuJoCo does, unless it says otherwise."""
 
     compiles, reasons, settings = True, REASONS, SETTINGS
 
@@ -43,7 +46,7 @@ class Port(Engine):
 
     @property
     def _mujoco(self) -> MuJoCo:
-        return MuJoCo({name: text for name, text in self.options.items() if name == "integrator" or name in SETTINGS})
+        return MuJoCo({name: text for name, text in self.options.items() if name in ("integrator", "profile", *SETTINGS)})
 
     def discretisation(self, scene: Scenario) -> str | None:
         """MuJoCo's."""
@@ -56,20 +59,25 @@ class Port(Engine):
 def ported_model(scene: Scenario, dt: float, engine: Port) -> tuple[Any, dict[str, Any]]:
     """A compiled model without the flags that ports lack (autoreset, diagexact), and its settings."""
     integrator, precision, given = engine.option("integrator"), engine.precision, engine.given
-    floor = scene.floor
-    pair = {} if floor is None else contact(floor, dt)
-    if floor is not None and floor.friction == "infinite" and precision is np.float32:
-        pair["friction"][:2] = [STICKING, STICKING]
-    spec = calibrated_specification(scene, dt, integrator, FORM, [pair] if pair else [], {})
     settings: dict[str, Any] = {"mujoco": mujoco.__version__, "precision": np.dtype(precision).name, "integrator": integrator}
+    settings |= {"profile": engine.option("profile")}
+    if engine.is_default:
+        spec, pair = default_specification(scene, dt, integrator, FORM), dict[str, Any]()
+    else:
+        pair = {} if scene.floor is None else contact(scene.floor, dt)
+        if scene.floor is not None and scene.floor.friction == "infinite" and precision is np.float32:
+            pair["friction"][:2] = [STICKING, STICKING]
+        spec = calibrated_specification(scene, dt, integrator, FORM, [pair] if pair else [], {})
+        if pair:
+            settings |= {"cone": "pyramidal" if pair["condim"] == 1 else "elliptic", "jacobian": "dense"}
+            spec.option.cone = CONES[settings["cone"]]
+        if scene.damping is None:
+            settings["eulerdamp"] = "disable"
+            spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
     spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    if pair:
-        settings |= {"cone": "pyramidal" if pair["condim"] == 1 else "elliptic", "jacobian": "dense"}
-        spec.option.cone = CONES[settings["cone"]]
-    if scene.damping is None:
-        settings["eulerdamp"] = "disable"
-        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
     model = spec.compile()
     set_damping(model, scene)
     set_in(model, given)
+    if engine.is_default:
+        settings |= {name: value for name, value in in_force(model, 0).items() if name in SETTINGS}
     return model, settings | pair | given

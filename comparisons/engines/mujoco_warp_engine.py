@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 
 from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, KnownLimitation, OneWorld, Simulation
-from dropspin.comparisons.engines.mapping import built
+from dropspin.comparisons.engines.mapping import PROFILES, built
 from dropspin.comparisons.engines.mujoco_limitations import limitations_met
 from dropspin.comparisons.engines.mujoco_ports import Port, ported_model
 from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
@@ -28,7 +28,7 @@ class MuJoCoWarp(Port):
     """MuJoCo Warp's free body and, where the scene has a floor, one contact pair."""
 
     name, precision, mixes_scenes = "mujoco-warp", np.float32, True
-    choices: ClassVar = {"integrator": ("euler", "implicit", "implicitfast", "rk4")}
+    choices: ClassVar = {"profile": PROFILES, "integrator": ("euler", "implicit", "implicitfast", "rk4")}
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return OneWorld(scene, Worlds([scene], dt, self))

@@ -4,7 +4,7 @@ Of these solvers XPBD alone has restitution; it acts on the velocity after gravi
 stiffness and damping.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from typing import Any, ClassVar
 
@@ -12,7 +12,9 @@ import numpy as np
 import warp as wp
 
 from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, KnownLimitation, OneWorld, Simulation
-from dropspin.comparisons.engines.mapping import friction_of, refusal_of_rest_speed
+from dropspin.comparisons.engines.mapping import PROFILES, friction_of, refusal_of_rest_speed
+from dropspin.comparisons.engines.newton_settings import SETTINGS, SHAPE, STICKING, settings_of
+from dropspin.comparisons.engines.options import Setting, calibrated_values
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box, Sphere
@@ -23,20 +25,7 @@ from dropspin.scenarios.state import SPIN, VELOCITY
 wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which prints devices and each module that it compiles
 import newton  # noqa: E402
 
-STICKING = 1e4
-UNDAMPED = {"angular_damping": 0.0}
-SOLVERS: dict[str, tuple[str, dict[str, Any]]] = {
-    "xpbd": ("SolverXPBD", UNDAMPED | {"rigid_contact_relaxation": 1.0}),
-    "semi-implicit": ("SolverSemiImplicit", UNDAMPED),
-    "featherstone": ("SolverFeatherstone", UNDAMPED),
-    "mujoco": ("SolverMuJoCo", {}),
-}
-REASONS = {
-    "angular_damping": "0.05 by default in semi-implicit and featherstone, whatever the scene says",
-    "enable_restitution": "off by default, which is right for restitution 0 alone; on, it then slows rolling balls and rocking blocks",
-    "mu_torsional": "none, as mu_rolling; at the default 0.005, a box that turns on a rough floor loses 0.044 of its spin too much",
-    "rigid_contact_relaxation": "removes the whole depth of a contact; at the default 0.8 a fifth of it is left",
-}
+SOLVERS = {"xpbd": "SolverXPBD", "semi-implicit": "SolverSemiImplicit", "featherstone": "SolverFeatherstone", "mujoco": "SolverMuJoCo"}
 SPIN_GAINED = 3e-7
 """Share of ω in a step, at most; measured 1.9e-7 to 2.4e-7 with steps of 10 to 0.25 ms, about a principal axis."""
 TORQUE = 3.6e-7
@@ -47,9 +36,14 @@ ENERGIES = ("energy_error", "energy_gain", "energy_drift")
 class Newton(Engine):
     """Newton's rigid body."""
 
-    name, order, compiles, precision, reasons, mixes_scenes = "newton", 1.0, True, np.float32, REASONS, True
+    name, order, compiles, precision, mixes_scenes = "newton", 1.0, True, np.float32, True
     shapes: ClassVar = ("sphere", "box")
-    choices: ClassVar = {"solver": tuple(SOLVERS)}
+    choices: ClassVar = {"solver": tuple(SOLVERS), "profile": PROFILES}
+
+    @property
+    def settings(self) -> Mapping[str, Setting]:  # type: ignore[override]  # they depend on the option
+        """The settings of the solver, and those that need another one."""
+        return settings_of(self.options.get("solver", "xpbd"))
 
     def declines(self, scene: Scenario) -> str | None:
         solver, floor = self.option("solver"), scene.floor
@@ -57,7 +51,7 @@ class Newton(Engine):
             return "Newton's MuJoCo solver needs mujoco-warp; install newton[sim]"
         if scene.damping is not None:
             return "the adapter maps no damping"
-        if floor is None:
+        if floor is None or self.is_default or (solver != "xpbd" and self.given):
             return None
         if solver != "xpbd":
             return "this solver's contacts are springs and dampers without a restitution: a ball rebounds alike with 0.5 and with 0.9"
@@ -71,31 +65,39 @@ class Newton(Engine):
             )
         return None
 
+    def chosen(self, scene: Scenario) -> dict[str, Any]:
+        """The settings for a scene; those left out are Newton's own."""
+        floor, chosen = scene.floor, dict[str, Any]()
+        if not self.is_default:
+            chosen = calibrated_values(self.settings) | {"enable_restitution": floor is not None and floor.restitution > 0.0}
+        if floor is not None:
+            chosen |= {"restitution": floor.restitution, "mu": friction_of(floor, STICKING)}
+        return {name: value for name, value in (chosen | self.given).items() if self.unmet_need(name) is None}
+
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return OneWorld(scene, Worlds([scene], dt, self.option("solver")))
+        return OneWorld(scene, Worlds([scene], dt, self))
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
         """None for floors of which some have a restitution and others not, as XPBD's restitution is on or off for all."""
-        restitutions = {member.floor is not None and member.floor.restitution > 0.0 for member in members}
-        return Worlds(members, dt, self.option("solver")) if len(restitutions) == 1 else None
+        restitutions = {self.chosen(member).get("enable_restitution") for member in members}
+        return Worlds(members, dt, self) if len(restitutions) == 1 else None
 
 
 class Worlds(BatchSimulation):
     """Worlds with a body each on Warp's default device, with their step as a graph."""
 
-    def __init__(self, members: Sequence[Scenario], dt: float, solver: str) -> None:
+    def __init__(self, members: Sequence[Scenario], dt: float, engine: Newton) -> None:
         self.velocity_lag, scene = 0.5 * dt, members[0]
-        (name, options), surface = SOLVERS[solver], self._surface(scene)
-        if solver == "xpbd":
-            options = options | {"enable_restitution": surface.get("restitution", 0.0) > 0.0}
+        solver, chosen = engine.option("solver"), engine.chosen(scene)
         builder = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=tuple(scene.acceleration))
         if differ_in_start_alone(members):
-            builder.replicate(self._world(scene), len(members))
+            builder.replicate(_world(scene, chosen), len(members))
         else:
             for member in members:
-                builder.add_world(self._world(member))
+                builder.add_world(_world(member, engine.chosen(member)))
         self.model: Any = builder.finalize()
-        self._solver = getattr(newton.solvers, name)(self.model, **options)
+        options = {name: value for name, value in chosen.items() if name not in SHAPE}
+        self._solver: Any = getattr(newton.solvers, SOLVERS[solver])(self.model, **options)
         self._now, self._next, self._control = self.model.state(), self.model.state(), self.model.control()
         self._pipeline = None if scene.floor is None else newton.CollisionPipeline(self.model)
         self._contacts = self._pipeline.contacts() if self._pipeline else None
@@ -109,27 +111,18 @@ class Worlds(BatchSimulation):
         self._now.body_qd.assign(rows[:, 7:])
         newton.eval_ik(self.model, self._now, self._now.joint_q, self._now.joint_qd)
         made = {"version": version("newton"), "warp": wp.config.version, "device": f"{wp.get_device()} ({wp.get_device().name})"}
-        self.settings = made | {"solver": solver} | options | surface
+        self.settings = made | {name: engine.option(name) for name in engine.choices} | self._in_force(solver)
 
-    def _surface(self, scene: Scenario) -> dict[str, float]:
-        if scene.floor is None:
-            return {}
-        friction = friction_of(scene.floor, STICKING)
-        return {"restitution": scene.floor.restitution, "mu": friction, "mu_torsional": 0.0, "mu_rolling": 0.0}
-
-    def _world(self, scene: Scenario) -> Any:
-        world, body = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=tuple(scene.acceleration)), scene.body
-        inertia = wp.mat33(*body.inertia_tensor.ravel().tolist())
-        moving = world.add_body(mass=body.mass, inertia=inertia, lock_inertia=True)
-        if scene.floor is None:
-            return world
-        config = newton.ModelBuilder.ShapeConfig(density=0.0, **self._surface(scene))
-        world.add_ground_plane(cfg=config)
-        if isinstance(body, Sphere):
-            world.add_shape_sphere(moving, radius=body.radius, cfg=config)
-        elif isinstance(body, Box):
-            world.add_shape_box(moving, cfg=config, **dict(zip(("hx", "hy", "hz"), body.half_extents, strict=True)))
-        return world
+    def _in_force(self, solver: str) -> dict[str, Any]:
+        """The settings as Newton has them; those of shapes are the first one's."""
+        options, found = self._solver.mj_model.opt if solver == "mujoco" else self._solver, dict[str, Any]()
+        for name, setting in SETTINGS[solver].items():
+            if name not in SHAPE:
+                value = getattr(options, name)
+                found[name] = setting.values[value] if setting.values else value
+            elif self.model.shape_count:
+                found[name] = float(str(getattr(self.model, SHAPE[name]).numpy()[0]))  # with the digits of single precision
+        return found
 
     def _step(self, dt: float) -> None:
         self._now.clear_forces()
@@ -167,3 +160,19 @@ class Worlds(BatchSimulation):
         """The first world."""
         mass, inertia, gravity = (part.numpy()[0] for part in (self.model.body_mass, self.model.body_inertia, self.model.gravity))
         return AsBuilt(float(mass), np.array(inertia, dtype=float), np.array(gravity, dtype=float))
+
+
+def _world(scene: Scenario, chosen: Mapping[str, Any]) -> Any:
+    """A scene's body, over a plane where it has a floor."""
+    world, body = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=tuple(scene.acceleration)), scene.body
+    inertia = wp.mat33(*body.inertia_tensor.ravel().tolist())
+    moving = world.add_body(mass=body.mass, inertia=inertia, lock_inertia=True)
+    if scene.floor is None:
+        return world
+    config = newton.ModelBuilder.ShapeConfig(density=0.0, **{name: value for name, value in chosen.items() if name in SHAPE})
+    world.add_ground_plane(cfg=config)
+    if isinstance(body, Sphere):
+        world.add_shape_sphere(moving, radius=body.radius, cfg=config)
+    elif isinstance(body, Box):
+        world.add_shape_box(moving, cfg=config, **dict(zip(("hx", "hy", "hz"), body.half_extents, strict=True)))
+    return world

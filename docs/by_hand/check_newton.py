@@ -11,11 +11,11 @@ G = 9.8  # m/s²
 BALL = np.full(3, 0.4 * 0.1**2)  # kg m²
 
 
-def motion(solver, start, dt, duration, inertia, add_shape=None, gravity=G, restitution=0.0, mu=0.0):
+def motion(solver, start, dt, duration, inertia, add_shape=None, gravity=G, restitution=0.0, mu=0.0, torsional=0.0):
     """Position, quaternion [x, y, z, w], velocity and spin after each step, shape (n + 1, 13)."""
     builder = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=(0.0, -gravity, 0.0))
     body = builder.add_body(mass=1.0, inertia=wp.mat33(*np.diag(inertia).ravel()), lock_inertia=True)
-    surface = newton.ModelBuilder.ShapeConfig(density=0.0, restitution=restitution, mu=mu, mu_torsional=0.0, mu_rolling=0.0)
+    surface = newton.ModelBuilder.ShapeConfig(density=0.0, restitution=restitution, mu=mu, mu_torsional=torsional, mu_rolling=0.0)
     if add_shape:
         add_shape(builder, body, surface)
         builder.add_ground_plane(cfg=surface)
@@ -193,6 +193,25 @@ def rough_rebound():
     line("Rough rebound: lost course [m/s]", f"{min(lost):.2f} to {max(lost):.2f}", exact, "0.02 to 0.30")
 
 
+def defaults():
+    """Solvers without arguments: a ball with restitution 0.5 falls 1 m, a free body spins, and a ball falls on a frictionless floor."""
+    solvers, fall = newton.solvers, state([0.0, 1.1, 0.0])
+    y = motion(solvers.SolverXPBD, fall, 1e-3, 1.0, BALL, ball, restitution=0.5)[:, 1]
+    line("Default XPBD: height of the rebound over the fall", f"{y[y.argmin() :].max() - 0.1:.2f}", 0.25, "0.25 too low")
+    inertia = np.array([0.1**2 + 0.2**2, 0.3**2 + 0.2**2, 0.3**2 + 0.1**2]) / 3.0
+    for torsional in (0.005, 0.0):
+        s = motion(
+            solvers.SolverXPBD, state([0.0, 0.1, 0.0], spin=[0.0, 4.0, 0.0]), 1e-3, 2.0, inertia, box(0.3, 0.1, 0.2), torsional=torsional
+        )
+        line(f"Default XPBD, mu 0, mu_torsional {torsional}: spin after 2 s [rad/s]", f"{s[-1, 11]:.3f}", 4, "loses spin")
+    for solver, stated in ((solvers.SolverSemiImplicit, "0.78 lost"), (solvers.SolverFeatherstone, "ignores it")):
+        s = motion(solver, state(spin=[5.0, 0.0, 0.0]), 1e-3, 30.0, inertia, gravity=0.0)
+        line(f"Default {solver.__name__}: share of the spin lost in 30 s", f"{1.0 - s[-1, 10] / 5.0:.2f}", 0, stated)
+    for cone in ("pyramidal", "elliptic"):
+        s = motion(lambda model, cone=cone: solvers.SolverMuJoCo(model, cone=cone), fall, 1e-3, 0.6, BALL, ball)
+        line(f"MuJoCo solver, {cone}, mu 0: states are finite", np.isfinite(s).all(), True, "NaN if pyramidal")
+
+
 if __name__ == "__main__":
-    for finding in (spin, rebound, flat_box, slide, roll, rock, grip, rough_rebound):
+    for finding in (spin, rebound, flat_box, slide, roll, rock, grip, rough_rebound, defaults):
         finding()

@@ -1,6 +1,7 @@
 """The settings of Newton's solvers and shapes that can be given, by its names: defaults, calibrated values and reasons."""
 
 from functools import cache
+from itertools import chain
 
 from dropspin.comparisons.engines.options import Setting
 
@@ -76,7 +77,7 @@ SETTINGS = {
 def settings_of(solver: str) -> dict[str, Setting]:
     """The settings, with the defaults of a solver; those that it does not have need one that has them."""
     found = dict(SETTINGS.get(solver, {}))
-    for other, settings in SETTINGS.items():
-        for name, setting in settings.items():
-            found.setdefault(name, setting._replace(needs=(("solver", other),)))
+    for name, setting in chain.from_iterable(settings.items() for settings in SETTINGS.values()):
+        having = [other for other, settings in SETTINGS.items() if name in settings]
+        found.setdefault(name, setting._replace(needs=(("solver", *having),)))
     return found

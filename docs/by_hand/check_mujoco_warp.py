@@ -20,6 +20,11 @@ CONTACT = """<contact><pair geom1="floor" geom2="body" condim="{condim}" frictio
 solimp="0.9999 0.9999 0.001 0.5 2" solreffriction="0 -1000"/></contact>"""
 
 
+SLIPPERY = """<mujoco><option timestep="1e-3" gravity="0 -9.8 0" cone="{cone}"/><default><geom friction="0 0.005 0.0001"/></default>
+<worldbody><geom type="plane" size="0 0 1" zaxis="0 1 0"/><body><freejoint/><geom type="sphere" size="0.1" mass="1"/></body></worldbody>
+</mujoco>"""
+
+
 def model(inertia=INERTIA, shape='type="sphere" size="1"', dt=1e-3, integrator="Euler", restitution=None, friction=0.0, exact="disable"):
     """A free body, over a floor if there is a restitution; `exact` is MuJoCo's flag for the exact inertia of a contact."""
     damping, condim = -(1.0 + (restitution or 0.0)) / dt, 3 if friction else 1
@@ -111,6 +116,15 @@ def corner():
     line("Corner: difference from MuJoCo", f"{found.max():.1e}", 0, "3.3e-5")
 
 
+def slippery():
+    """A ball that lands on a floor without friction, with MuJoCo's own contacts of three dimensions."""
+    start = ([0.0, 0.2, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(6))
+    for cone, stated in (("pyramidal", "nan"), ("elliptic", "0.100")):
+        ball = mujoco.MjModel.from_xml_string(SLIPPERY.format(cone=cone))
+        line(f"Without friction, {cone}: height", f"{in_warp(ball, *start, 400)[-1, 1]:.3f}", 0.1, stated)
+        line("MuJoCo's", f"{in_mujoco(ball, *start, 400)[-1, 1]:.3f}", 0.1, "0.100")
+
+
 if __name__ == "__main__":
-    for finding in (rebound, corner, tumbling):
+    for finding in (rebound, corner, slippery, tumbling):
         finding()

@@ -9,6 +9,14 @@ def pytest_addoption(parser):
     parser.addoption("--engine", required=True, help="the engine's name, as in `dropspin list engines`")
 
 
+def pytest_ignore_collect(collection_path, config):
+    """The file test_ENGINE.py is for the environment of this engine alone."""
+    from support.heavy_engines import CASES
+
+    name = collection_path.stem.removeprefix("test_")
+    return True if name in CASES and name != config.getoption("engine") else None
+
+
 def pytest_report_header():
     """The versions that are tested."""
     return ", ".join(f"{package} {version}" for package, version in versions().items() if version)

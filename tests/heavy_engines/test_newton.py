@@ -9,8 +9,6 @@ from dropspin.comparisons.engines.newton_settings import SETTINGS, SHAPE
 from dropspin.comparisons.engines.registry import engine
 from dropspin.scenarios import DropspinError
 
-newton = pytest.importorskip("newton")
-
 
 def in_force(options):
     """The settings of a sliding box, as Newton has them."""
@@ -21,6 +19,8 @@ def in_force(options):
 @pytest.mark.parametrize("solver", SETTINGS)
 def test_defaults_are_those_of_the_library(solver):
     """Of a solver and of shapes that were made without them; the scene's are those of a new `ShapeConfig`."""
+    import newton
+
     has, shape = in_force(f"solver={solver},profile=default"), newton.ModelBuilder.ShapeConfig()
     for name, setting in SETTINGS[solver].items():
         assert (getattr(shape, name) if setting.is_computed and name in SHAPE else has[name]) == setting.default, name

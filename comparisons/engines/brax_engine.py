@@ -13,10 +13,11 @@ from jax import numpy as jnp
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, OneWorld, Simulation
+from dropspin.comparisons.engines.brax_settings import FLIGHT, OF_SHAPES, SETTINGS, description
 from dropspin.comparisons.engines.mujoco_simulation import from_world
+from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.model import initial_states
 
 # MJX prints that Warp is not installed, which it does not need, and JAXopt warns that it is no longer maintained.
@@ -29,60 +30,66 @@ with redirect_stdout(StringIO()), warnings.catch_warnings(action="ignore"):
 jax.config.update("jax_enable_x64", True)  # for the whole process; each engine has one of its own
 PIPELINES = {"spring": spring, "generalized": generalized}
 CHUNK = 1000  # states that one call of the compiled function records at most
-REASONS = {
-    "elasticity": "the scene's restitution, of body and floor: brax takes the mean of both",
-    "baumgarte_erp": "0; the default, 0.1, adds a tenth of the penetration per step to the speed of a rebound",
-    "vel_damping": "minus the scene's decay rate",
-    "ang_damping": "as vel_damping",
-}
+STRONGEST = 1e6
 
 
 class Brax(Engine):
     """brax's free body, on a plane where the scene has a floor."""
 
-    name, compiles, order, reasons = "brax", True, 1.0, REASONS
+    name, compiles, order = "brax", True, 1.0
     shapes: ClassVar = ("sphere", "box")
-    choices: ClassVar = {"pipeline": tuple(PIPELINES)}
+    choices: ClassVar = {"profile": mapping.PROFILES, "pipeline": tuple(PIPELINES)}
+    settings: ClassVar = SETTINGS
 
     def declines(self, scene: Scenario) -> str | None:
-        pipeline, floor = self.option("pipeline"), scene.floor
-        if pipeline == "generalized":
-            soft = "contacts of brax's pipeline generalized are soft and have no coefficient of restitution"
-            return mapping.refusal_of_damped_axes(scene) if floor is None else soft
-        if floor is not None and scene.body.shape == "box":
+        is_soft, floor = self.option("pipeline") == "generalized", scene.floor
+        unfit = mapping.refusal_of_damped_axes(scene) if is_soft else None
+        if unfit is not None or floor is None or not self.is_calibrated:
+            return unfit
+        if is_soft:
+            return "contacts of brax's pipeline generalized are soft and have no coefficient of restitution"
+        if scene.body.shape == "box":
             return "brax's pipeline spring divides an impulse by the number of contacts: a cube that lands flat does not rebound"
         return mapping.refusal_of_rest_speed(scene, "brax")
+
+    def chosen(self, scene: Scenario) -> dict[str, Any]:
+        """The settings for a scene; those left out are brax's own."""
+        floor, chosen = scene.floor, {} if self.is_default else calibrated_values(SETTINGS)
+        if scene.damping is not None:
+            chosen |= {"vel_damping": -scene.damping.linear, "ang_damping": -scene.damping.angular}
+        if floor is not None:
+            for prefix in ("", "floor_"):
+                chosen |= {f"{prefix}elasticity": floor.restitution, f"{prefix}friction": min(floor.coefficient, STRONGEST)}
+        return chosen | self.given
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return OneWorld(scene, self.prepare_batch([scene], dt))
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> "Worlds":
-        return Worlds(members, dt, self.option("pipeline"))
+        return Worlds(members, dt, self)
 
 
 class Worlds(BatchSimulation):
     """Worlds of one scene that one program steps together."""
 
-    def __init__(self, members: Sequence[Scenario], dt: float, pipeline: str) -> None:
-        self.velocity_lag, self._pipeline, scene = 0.5 * dt, pipeline, members[0]
-        chosen: dict[str, Any] = {"baumgarte_erp": 0.0, "elasticity": scene.floor.restitution} if scene.floor else {}
-        linear, angular = mapping.decay_rates(scene).values()
-        if scene.damping is not None and pipeline == "spring":
-            chosen |= {"vel_damping": -linear, "ang_damping": -angular}
+    def __init__(self, members: Sequence[Scenario], dt: float, engine: Brax) -> None:
+        self.velocity_lag, self._pipeline, scene = 0.5 * dt, engine.option("pipeline"), members[0]
         with warnings.catch_warnings(action="ignore"):  # brax says that its pipelines are no longer maintained
-            system = mjcf.loads(description(scene, dt))
+            system = mjcf.loads(description(scene, dt, engine.chosen(scene)))
         moments, axes = mapping.principal_frame(scene.body.inertia_tensor)
         frame, mass = Transform(pos=np.zeros((1, 3)), rot=np.roll(axes, 1)[None]), np.array([scene.body.mass])
+        linear, angular = mapping.decay_rates(scene).values()
         damping = np.repeat([linear * scene.body.mass, angular], 3) * [1.0, 1.0, 1.0, *moments]
         link = system.link.replace(inertia=Inertia(frame, np.diag(moments)[None], mass))
         parts = {"link": link, "dof": system.dof.replace(damping=damping), "mj_model": None}
-        values = {name: np.broadcast_to(value, np.shape(getattr(system, name))) for name, value in chosen.items()}
-        self._system = _typed(system.replace(**parts, **values))
+        self._system = _typed(system.replace(**parts))
         with warnings.catch_warnings(action="ignore"):  # of MJX, about its data that brax reads
-            self._state = _typed(_started(pipeline, self._system, from_world(initial_states(members))))
+            self._state = _typed(_started(self._pipeline, self._system, from_world(initial_states(members))))
             self._run(0, 0)  # compiles
         made = {"version": version("brax"), "jax": jax.__version__, "mujoco-mjx": version("mujoco-mjx")}
-        self.settings = made | {"device": jax.devices()[0].device_kind} | chosen
+        made |= {"device": jax.devices()[0].device_kind} | {name: engine.option(name) for name in engine.choices}
+        names = (name for name in (SETTINGS if scene.floor else FLIGHT) if engine.unmet_need(name) is None)
+        self.settings = made | {name: _in_force(self._system, name) for name in names}
 
     def _run(self, count: int, every: int) -> Array:
         """Take `count` times `every` steps; the states after each `every`, shape (count, size, 13)."""
@@ -105,16 +112,13 @@ class Worlds(BatchSimulation):
         return mapping.built(inertia.mass[0], np.diag(inertia.i[0]), np.roll(inertia.transform.rot[0], -1), self._system.gravity)
 
 
-def description(scene: Scenario, dt: float) -> str:
-    """A scene as MJCF; its mass and inertia are set later."""
-    plane, shape = "", ""
-    if scene.floor is not None and isinstance(scene.body, Sphere):
-        friction = f'friction="{min(scene.floor.coefficient, 1e6)!r} 0 0"'
-        plane = f'<geom type="plane" size="0 0 1" zaxis="0 1 0" {friction}/>'
-        shape = f'<geom type="sphere" size="{scene.body.radius!r}" {friction}/>'
-    options = f'<option timestep="{dt!r}" gravity="{" ".join(map(repr, scene.acceleration.tolist()))}"/>'
-    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
-    return f"<mujoco>{options}<worldbody>{plane}<body><freejoint/>{inertial}{shape}</body></worldbody></mujoco>"
+def _in_force(system: Any, name: str) -> Any:
+    """The value of a setting in a system, whose shapes are the floor and the body."""
+    bare = name.removeprefix("floor_")
+    value = getattr(system, OF_SHAPES.get(bare, bare))
+    if bare in OF_SHAPES:
+        value = value[1 if bare == name else 0]
+    return np.asarray(value[0] if bare == "friction" else value).tolist()
 
 
 def _typed(tree: Any) -> Any:

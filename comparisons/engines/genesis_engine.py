@@ -11,8 +11,16 @@ import genesis
 import numpy as np
 
 from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, OneWorld, Simulation
-from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE, refusal_of_damped_axes, refusal_of_floor, refusal_of_rest_speed
+from dropspin.comparisons.engines.genesis_settings import RIGID, SETTINGS, in_force, set_surfaces
+from dropspin.comparisons.engines.mapping import (
+    FLOOR_HALF_SIZE,
+    PROFILES,
+    refusal_of_damped_axes,
+    refusal_of_floor,
+    refusal_of_rest_speed,
+)
 from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
+from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
@@ -20,21 +28,17 @@ from dropspin.scenarios.model import initial_states
 
 INTEGRATORS = {"approximate_implicitfast": "approximate_implicitfast", "euler": "Euler"}
 PRECISIONS = {"float32": "32", "float64": "64"}
-DAMPER = [1e6, 0.9999, 0.9999, 0.001, 0.5, 2.0]  # a dampratio without a spring, and the largest impedance that Genesis allows
 LEAST_FRICTION, STICKING = 0.01, 1e4
-REASONS = {
-    "sol_params": "the damper stops the normal velocity in one step: its time constant is the least, 2 dt, and its stiffness vanishes",
-    "friction_cone": "elliptic: the same friction in every direction",
-    "contact_resolution": "signorini: the friction is limited by the normal force alone",
-}
+MATERIAL_FRICTION = 5.0  # the largest that Genesis's materials allow; with 1e4 and its default pyramid, bodies fall through the floor
 
 
 class Genesis(Engine):
     """Genesis's rigid body."""
 
-    name, order, compiles, reasons = "genesis", 1.0, True, REASONS
+    name, order, compiles = "genesis", 1.0, True
     shapes: ClassVar = ("sphere", "box")
-    choices: ClassVar = {"precision": tuple(PRECISIONS), "integrator": tuple(INTEGRATORS)}
+    choices: ClassVar = {"profile": PROFILES, "precision": tuple(PRECISIONS), "integrator": tuple(INTEGRATORS)}
+    settings: ClassVar = SETTINGS
 
     @property
     def precision(self) -> type:  # type: ignore[override]  # it depends on the option
@@ -43,8 +47,8 @@ class Genesis(Engine):
 
     def declines(self, scene: Scenario) -> str | None:
         floor = scene.floor
-        unfit = refusal_of_damped_axes(scene)
-        if unfit is not None or floor is None:
+        unfit = refusal_of_damped_axes(scene) or refusal_of_floor(scene, "plane with edges")
+        if unfit is not None or floor is None or not self.is_calibrated:
             return unfit
         if floor.coefficient < LEAST_FRICTION:
             return "Genesis raises a contact's coefficient of friction to 0.01: a body that slides without friction loses 0.098 m/s in 1 s"
@@ -53,14 +57,24 @@ class Genesis(Engine):
                 "the adapter stops a body in one step with a contact's damper; Genesis raises its time constant to 2 dt, with which a ball "
                 "that falls 0.5 m does not rebound"
             )
-        return refusal_of_rest_speed(scene, "Genesis") or refusal_of_floor(scene, "plane with edges")
+        return refusal_of_rest_speed(scene, "Genesis")
+
+    def chosen(self, scene: Scenario, dt: float) -> dict[str, Any]:
+        """The settings for a scene at a time step [s]; those left out are Genesis's own."""
+        floor, chosen = scene.floor, dict[str, Any]()
+        if floor is None:
+            return self.given
+        if not self.is_default:
+            chosen |= calibrated_values(SETTINGS) | {"constraint_timeconst": 2.0 * dt / self.given.get("substeps", 1)}
+        friction = min(floor.coefficient, MATERIAL_FRICTION if self.is_default else STICKING)
+        return chosen | {"friction": friction, "floor_friction": friction} | self.given
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return OneWorld(scene, self.prepare_batch([scene], dt))
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> "Worlds":
         start(self.option("precision"))
-        return Worlds(members, dt, INTEGRATORS[self.option("integrator")], self.precision)
+        return Worlds(members, dt, self)
 
 
 def start(precision: str) -> None:
@@ -74,14 +88,16 @@ def start(precision: str) -> None:
 class Worlds(BatchSimulation):
     """Worlds of one scene with a body each."""
 
-    def __init__(self, members: Sequence[Scenario], dt: float, integrator: str, precision: type) -> None:
-        self.velocity_lag, morphs, options = 0.5 * dt, genesis.morphs, genesis.options
+    def __init__(self, members: Sequence[Scenario], dt: float, engine: Genesis) -> None:
+        morphs, options = genesis.morphs, genesis.options
         scene, body, floor = members[0], members[0].body, members[0].floor
-        contacts: dict[str, Any] = {} if floor is None else {"friction_cone": "elliptic", "contact_resolution": "signorini"}
-        chosen = {name: getattr(getattr(genesis, name), value) for name, value in contacts.items()}
-        chosen |= {"integrator": getattr(genesis.integrator, integrator), "disable_constraint": floor is None}
-        rigid = options.RigidOptions(enable_collision=floor is not None, **chosen)
-        world = options.SimOptions(dt=dt, gravity=tuple(scene.acceleration))
+        chosen = engine.chosen(scene, dt)
+        substeps = chosen.get("substeps", 1)
+        self.velocity_lag = 0.5 * dt / substeps
+        words = {name: chosen[name] for name in RIGID if name in chosen} | {"integrator": INTEGRATORS[engine.option("integrator")]}
+        solver = {name: getattr(getattr(genesis, name), word) if isinstance(word, str) else word for name, word in words.items()}
+        rigid = options.RigidOptions(enable_collision=floor is not None, disable_constraint=floor is None, **solver)
+        world = options.SimOptions(dt=dt, gravity=tuple(scene.acceleration), substeps=substeps)
         self._scene = genesis.Scene(sim_options=world, rigid_options=rigid, show_viewer=False)
         self._body: Any = self._scene.add_entity(morphs.MJCF(file=description(scene), align=False))
         ground = (
@@ -90,20 +106,20 @@ class Worlds(BatchSimulation):
         self._scene.build(n_envs=len(members))
         self._body.links[0].set_mass(body.mass)
         self._body.links[0].set_inertia(body.inertia_tensor)
-        if floor is not None and ground is not None:
-            contacts |= {"friction": min(floor.coefficient, STICKING), "sol_params": [2.0 * dt, *DAMPER]}
-            for geom in (*self._body.geoms, *ground.geoms):
-                geom.set_friction(contacts["friction"])
-                geom.set_sol_params(np.array(contacts["sol_params"]))
+        made = {"version": version("genesis-world"), "torch": version("torch"), "quadrants": version("quadrants")}
+        made |= {"device": str(genesis.device), "substeps": self._scene.sim.substeps}
+        self.settings = made | {name: engine.option(name) for name in engine.choices}
+        if ground is not None:
+            set_surfaces(self._body.geoms[0], ground.geoms[0], chosen)
+            found = in_force(self._scene.rigid_solver, self._body.geoms[0], ground.geoms[0])
+            self.settings |= {name: value for name, value in found.items() if engine.unmet_need(name) is None}
         if scene.damping is not None:
             rates = np.repeat([scene.damping.linear, scene.damping.angular], 3)
-            contacts["damping"] = (rates * [*np.full(3, body.mass), *np.diag(body.inertia_tensor)]).tolist()
-            self._body.set_dofs_damping(np.array(contacts["damping"]))
-        rows: Array = from_world(initial_states(members)).astype(precision)
+            self.settings["damping"] = (rates * [*np.full(3, body.mass), *np.diag(body.inertia_tensor)]).tolist()
+            self._body.set_dofs_damping(np.array(self.settings["damping"]))
+        rows: Array = from_world(initial_states(members)).astype(engine.precision)
         self._body.set_qpos(rows[:, :7])
         self._body.set_dofs_velocity(rows[:, 7:])
-        made = {"version": version("genesis-world"), "torch": version("torch"), "quadrants": version("quadrants")}
-        self.settings = made | {"device": str(genesis.device), "precision": np.dtype(precision).name, "integrator": integrator} | contacts
 
     def advance(self, steps: int) -> None:
         for _ in range(steps):

@@ -22,8 +22,6 @@ FLIGHT = {
     "ang_damping": Setting(
         0.0, "as vel_damping, of the spin", why="as vel_damping", unit="1/s", least=-math.inf, is_computed=True, needs=SPRING
     ),
-    "density": Setting(0.0, "of the medium", unit="kg/m³"),
-    "viscosity": Setting(0.0, "of the medium", unit="Pa s"),
     "matrix_inv_iterations": Setting(10, "steps that invert the mass matrix; with 0 it is inverted directly", needs=GENERALIZED),
 }
 """With and without a floor."""
@@ -61,8 +59,6 @@ NUMERICS = (
     *("spring_mass_scale", "spring_inertia_scale", "solver_maxls"),
 )
 """Those that MJCF has as custom numerics."""
-OPTIONS = {"density": "density", "viscosity": "viscosity", "solver_iterations": "iterations"}
-"""Those that MJCF has in its table `option`, and their names there."""
 OF_SHAPES = {"elasticity": "elasticity", "friction": "geom_friction", "solref": "geom_solref", "solimp": "geom_solimp"}
 """Those that each shape has, and their names in a `System`."""
 
@@ -71,7 +67,8 @@ def description(scene: Scenario, dt: float, chosen: Mapping[str, Any]) -> str:
     """A scene as MJCF; its mass and inertia are set later."""
     written = {name: spelled(value) for name, value in chosen.items()}
     options = {"timestep": repr(dt), "gravity": spelled(scene.acceleration.tolist())}
-    options |= {in_mjcf: written[name] for name, in_mjcf in OPTIONS.items() if name in written}
+    if "solver_iterations" in written:
+        options["iterations"] = written["solver_iterations"]
     numerics, solver, plane, shape = {name: written[name] for name in NUMERICS if name in written}, dict[str, str](), "", ""
     if scene.floor is not None:
         body = scene.body

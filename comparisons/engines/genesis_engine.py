@@ -29,7 +29,7 @@ from dropspin.scenarios.model import initial_states
 INTEGRATORS = {"approximate_implicitfast": "approximate_implicitfast", "euler": "Euler"}
 PRECISIONS = {"float32": "32", "float64": "64"}
 LEAST_FRICTION, STICKING = 0.01, 1e4
-MATERIAL_FRICTION = 5.0  # the largest that Genesis's materials allow; with 1e4 and its default pyramid, bodies fall through the floor
+MATERIAL_FRICTION = 5.0  # the largest that Genesis's materials allow; at 100, with its default pyramid, bodies fall through the floor
 
 
 class Genesis(Engine):

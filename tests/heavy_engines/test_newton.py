@@ -40,7 +40,7 @@ def test_solver_has_all_of_its_settings_that_are_given(solver):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ("ke=1e4", "ke has no effect with solver=xpbd; it needs solver=semi-implicit"),
+        ("ke=1e4", "ke has no effect with solver=xpbd; it needs solver=semi-implicit or solver=featherstone or solver=mujoco"),
         ("solver=mujoco,gap=0", "gap has no effect with solver=mujoco; it needs solver=xpbd"),
         ("solver=featherstone,angular_damping=0.05", "angular_damping has no effect with solver=featherstone"),
     ],

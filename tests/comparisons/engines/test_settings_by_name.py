@@ -1,13 +1,14 @@
 """Settings of an engine's library as options: what may be given, what is in force, and motions with a closed form."""
 
 import math
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from support.settings import verify_defaults_are_in_force, verify_settings_are_in_force
 
 from dropspin.comparisons.engines.mujoco_settings import SETTINGS, in_force
-from dropspin.comparisons.engines.options import spelled
+from dropspin.comparisons.engines.options import Configured, Setting, spelled
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.running.recording import simulate
 from dropspin.comparisons.running.verification import verify_build
@@ -57,6 +58,20 @@ def test_what_cannot_be_given_is_said_in_one_message(given, message):
     with pytest.raises(DropspinError, match=r"^[^\n]*$") as refused:
         engine(given)
     assert message in str(refused.value)
+
+
+class Solved(Configured):
+    name = "solved"
+    choices: ClassVar = {"solver": ("xpbd", "springs", "mujoco")}
+    settings: ClassVar = {"stiffness": Setting(1.0, "of a contact", needs=(("solver", "springs", "mujoco"),))}
+
+
+def test_setting_may_need_one_of_several_values_of_an_option():
+    for solver in ("springs", "mujoco"):
+        assert Solved({"solver": solver, "stiffness": "2"}).given == {"stiffness": 2.0}
+    with pytest.raises(DropspinError, match="no effect with solver=xpbd; it needs solver=springs or solver=mujoco"):
+        Solved({"stiffness": "2"})
+    assert Solved({"solver": "mujoco", "stiffness": "2"}).without(["solver"]).options == {}
 
 
 def test_labels_have_settings_as_they_are_documented():

@@ -1,8 +1,7 @@
 """Newton's settings, which depend on its solver."""
 
-import numpy as np
 import pytest
-from support.settings import other_value
+from support.settings import other_value, verify_equal
 
 from dropspin import scenarios
 from dropspin.comparisons.engines.newton_settings import SETTINGS, SHAPE
@@ -31,10 +30,7 @@ def test_solver_has_all_of_its_settings_that_are_given(solver):
     given = {name: other_value(setting) for name, setting in SETTINGS[solver].items()}
     has = in_force(",".join(f"{name}={value}" for name, value in {"solver": solver, **given}.items()))
     for name, value in given.items():
-        if isinstance(has[name], float):
-            np.testing.assert_allclose(has[name], float(value), rtol=1e-6)
-        else:
-            assert str(has[name]).lower() == value
+        verify_equal(has[name], value, name)
 
 
 @pytest.mark.parametrize(

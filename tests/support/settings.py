@@ -27,7 +27,7 @@ def verify_settings_are_in_force(name: str, scene: Scenario) -> None:
         needs = "".join(f",{other}={needed}" for other, needed, *_ in setting.needs)
         with engine(f"{name}[{option}={value}{needs}]").prepare(scene, 1e-3) as simulation:
             simulation.advance(1)
-            _verify_equal(simulation.settings.get(option, setting.default), value, option)
+            verify_equal(simulation.settings.get(option, setting.default), value, option)
 
 
 def verify_defaults_are_in_force(name: str, scene: Scenario) -> None:
@@ -36,10 +36,11 @@ def verify_defaults_are_in_force(name: str, scene: Scenario) -> None:
     with chosen.prepare(scene, 1e-3) as simulation:
         for option, setting in chosen.settings.items():
             if option in simulation.settings and not setting.is_computed and not option.startswith("floor_"):
-                _verify_equal(simulation.settings[option], spelled(setting.default), option)
+                verify_equal(simulation.settings[option], spelled(setting.default), option)
 
 
-def _verify_equal(has: Value, expected: str, option: str) -> None:
+def verify_equal(has: Value, expected: str, option: str) -> None:
+    """A setting has a value that is written as text: a number to the digits of single precision."""
     if isinstance(has, str | bool):
         assert spelled(has) == expected, option
     else:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import numpy as np
 from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS
 from dropspin.comparisons.measuring.metrics import metrics_for
-from dropspin.comparisons.measuring.tolerances import perturbed
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, EnsembleOutcome
 from dropspin.comparisons.running.engine_process import share_progress
 from dropspin.comparisons.running.ensembles import run_ensemble
@@ -31,7 +29,6 @@ class EngineRun:
         breakdown: Why there is no motion; None if there is one.
         motion: From the scene's own start, every step.
         phases: From each start phase.
-        perturbed: From starts perturbed by a few eps, set by set: an estimate of what rounding may do.
         limitations: Known limitations that the engine met.
         settings: The settings that it reported.
         outcome: What became of the scene's ensemble.
@@ -46,7 +43,6 @@ class EngineRun:
     breakdown: Breakdown | None = None
     motion: Trajectory | None = None
     phases: list[Trajectory] = field(default_factory=list)
-    perturbed: list[list[Trajectory]] = field(default_factory=list)
     limitations: Sequence[KnownLimitation] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     outcome: EnsembleOutcome | None = None
@@ -63,7 +59,6 @@ def run_engine(
     dt: float,
     starts: Sequence[Scenario],
     quick: bool,
-    perturbs: bool,
     on_simulations: OnSimulations = share_progress,
 ) -> EngineRun:
     """Run a scene from its own start, then from each of its start phases if there are several; failures are part of the result.
@@ -73,26 +68,22 @@ def run_engine(
         scene: The scene.
         dt: Time step [s].
         starts: The scene from each of its start phases.
-        quick: Whether perturbed starts are run only where verdicts need them, in single precision, and few members of an ensemble.
-        perturbs: Whether perturbed starts are run at all; they give the uncertainty of an error, not its value.
+        quick: Whether few members of an ensemble are run.
         on_simulations: Called after each simulation.
     """
     engine, found = entry.adapter, EngineRun(entry.label)
     try:
         verify_accepted(engine, scene)
         found.discretisation, found.order, found.precision = verified_claims(engine, scene)
-        sets = perturbed(scene, starts, found.precision) if perturbs and not (quick and found.precision is np.float64) else []
-        others = [*(starts if len(starts) > 1 else []), *chain(*sets)]
+        others = starts if len(starts) > 1 else []
         size = 0 if scene.recording is None else len(starts) // PHASES_OF_TOSS
         drawn = size and size * simulations_of(size)
         total = 1 + len(others) + drawn
         own = record(engine, scene, dt)
         on_simulations(1, total)
         found.motion, found.limitations, found.settings = own.motion, own.limitations, own.settings
-        recorded = record_batch(engine, others, dt, lambda done, _: on_simulations(1 + done, total)) if others else []
-        motions = (one.motion for one in recorded)
-        found.phases = [own.motion] if len(starts) == 1 else [next(motions) for _ in starts]
-        found.perturbed = [[next(motions) for _ in moved] for moved in sets]
+        recorded = record_batch(engine, others, dt, lambda done, _: on_simulations(1 + done, total)) if others else [own]
+        found.phases = [recording.motion for recording in recorded]
         found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt, QUICK_MEMBERS if quick else None)
         if drawn:
             found.uncertainties = uncertainties(engine, scene, dt, size, lambda done: on_simulations(total - drawn + done, total))
@@ -104,3 +95,10 @@ def run_engine(
     except Exception as error:  # whatever an engine raises costs its own row only
         found.breakdown = classify(error)
     return found
+
+
+def motions_from(
+    entry: EngineEntry, starts: Sequence[Scenario], dt: float, on_simulations: OnSimulations = share_progress
+) -> list[Trajectory]:
+    """The motions of an engine from other starts of a scene at a time step [s]."""
+    return [recording.motion for recording in record_batch(entry.adapter, starts, dt, on_simulations)]

@@ -26,7 +26,6 @@ from dropspin.comparisons.running.verification import (
     verify_starts,
 )
 from dropspin.scenarios import DropspinError, Scenario, Trajectory
-from dropspin.scenarios.state import PARTS
 
 
 @dataclass(eq=False)
@@ -156,8 +155,7 @@ def record_batch(
     times = dt * np.arange(steps + 1, dtype=float)
     verify_starts(engine, members, states[:, 0])
     on_simulations(size, size)
-    parts = zip(*(states[..., part] for part in PARTS.values()), strict=True)
-    motions = [Trajectory(times, position, orientation, velocity, spin, lag) for position, orientation, velocity, spin in parts]
+    motions = [Trajectory.from_states(times, of_one, lag) for of_one in states]
     return [Recording(motion, of_one, seconds=seconds) for motion, of_one in zip(motions, met or [()] * size, strict=True)]
 
 

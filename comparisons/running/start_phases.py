@@ -5,7 +5,7 @@ Starts that lie equal parts of a step further along the scene's motion draw that
 recording starts at the end of its flight; its four phases are earlier states of this flight.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -117,12 +117,11 @@ def compare(motions: Sequence[Trajectory], phases: Sequence[StartPhase]) -> list
 
 
 def measure(
-    own: StartPhase, dt: float, run: EngineRun, phases: Sequence[StartPhase], cases: Sequence[Comparison]
+    own: StartPhase, dt: float, run: EngineRun, cases: Sequence[Comparison], around: Sequence[Mapping[str, float]]
 ) -> dict[str, SeriesPoint]:
-    """Every metric of one engine at one time step, by name."""
+    """Every metric of one engine at one time step, by name; `around`: from each set of perturbed starts."""
     scene, quick, precision = own.scene, own.quick, run.precision
     steps, found = scene.steps(dt), {}
-    perturbed = [compare(motions, phases) for motions in run.perturbed]
     for metric in metrics_for(scene, own.truth):
         components, noise, rounded, unresolved = None, 0.0, 0.0, None
         try:
@@ -134,7 +133,7 @@ def measure(
         if quick and len(cases) > 1:
             average, components = average.less_certain(QUICK_NOISE), components and components.less_certain(QUICK_NOISE)
             noise = np.inf if metric.name in JUMPING else average.noise
-        moved = float(np.max([abs(metric.value_or_nan(some) - average.value) for some in perturbed], initial=0.0))
+        moved = float(np.max([abs(values[metric.name] - average.value) for values in around], initial=0.0))
         sampling_noise = FEW_DRAWS * moved if len(cases) == 1 else average.jump + moved
         noise = max(noise, run.uncertainties.get(metric.name, 0.0))
         allowed = tolerance(scene, metric.unit, precision, steps, sampling_noise)

@@ -11,7 +11,7 @@ from threading import RLock
 from unittest import mock
 
 from dropspin.comparisons.engines.stand_in import StandIn
-from dropspin.comparisons.running.engine_run import run_engine
+from dropspin.comparisons.running.engine_run import motions_from, run_engine
 from dropspin.comparisons.running.inputs import ignore
 from dropspin.comparisons.running.processes import Closed, EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown, classify
@@ -47,7 +47,7 @@ def call(self, entry, work, *given, on_simulations=ignore):
     on_simulations(0, 0)
     with _one_at_a_time, mock.patch.object(tempfile, "tempdir", tempfile.tempdir):
         try:
-            return work(entry, *given, *([on_simulations] if work is run_engine else []))
+            return work(entry, *given, *([on_simulations] if work in (run_engine, motions_from) else []))
         except Exception as error:
             return classify(error)
 

@@ -4,11 +4,12 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from dropspin.comparisons.running.engine_run import run_engine
+from dropspin.comparisons.running.engine_study import EngineStudy
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.forecast import MEASURING, Forecast, forecast, simulations
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.start_phases import StartPhase, start_phases
+from dropspin.comparisons.running.processes import FIVE_MINUTES, EngineProcesses
+from dropspin.comparisons.running.start_phases import StartPhase, phases_at
 from dropspin.comparisons.running.timing import Timing
 from dropspin.reports.stories.run import forecast_sentence
 
@@ -26,10 +27,14 @@ def prepared(name, quick=False):
 @pytest.mark.parametrize("quick", [False, True])
 @pytest.mark.parametrize("name", SCENES)
 def test_simulations_are_those_that_a_run_does(name, quick):
-    own, entry, totals = prepared(name, quick), engine_entry("wang"), []
-    starts = [phase.scene for phase in start_phases(own.scene, own.truth, DT, quick=quick)]
-    done = run_engine(entry, own.scene, DT, starts, quick, True, lambda _, total: totals.append(total))
-    assert simulations(own, entry, DT) == totals[-1] + (0 if done.outcome is None else len(done.outcome.rebound))
+    own, entry, reported = prepared(name, quick), engine_entry("wang"), []
+    with EngineProcesses(FIVE_MINUTES) as processes:
+        study = EngineStudy(own, entry, processes, reported.append)
+        study.run_at(DT, phases_at(own, DT), Timing())
+    outcome = study.outcomes[0].run.outcome
+    last = reported[-2]
+    assert last.done == last.total
+    assert simulations(own, entry, DT) == last.total + (0 if outcome is None else len(outcome.rebound))
 
 
 @pytest.mark.usefixtures("all_start_phases")

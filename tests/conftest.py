@@ -5,6 +5,7 @@ import importlib.util
 import os
 import shutil
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import compress
 from pathlib import Path
 
@@ -76,7 +77,7 @@ def _timed_briefly():
 
 @pytest.fixture(scope="session", autouse=True)
 def _few_start_phases():
-    """Eight start phases instead of 32: a test of what the mean over all of them is uses `all_start_phases`."""
+    """Four start phases instead of 32: a test of what the mean over all of them is uses `all_start_phases`."""
     from support.brief_runs import FEW
 
     with pytest.MonkeyPatch.context() as patch:
@@ -132,7 +133,7 @@ def engine_processes():
 
 @pytest.fixture
 def few_start_phases(monkeypatch):
-    """Two start phases instead of eight, for engines made for tests: they solve each start anew, and are as exact from each."""
+    """Two start phases instead of four, for engines made for tests: they solve each start anew, and are as exact from each."""
     monkeypatch.setattr("dropspin.comparisons.running.start_phases.START_PHASES", 2)
 
 
@@ -165,18 +166,28 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[
 
 @pytest.fixture(scope="session")
 def core_run(shared) -> Path:
-    """The folder of a run of the core catalogue with the three engines at the default time steps, data only; `load_results` reads it."""
+    """The folder of a run of the core catalogue with the three engines at the default time steps, data only; `load_results` reads it.
+
+    Two workers of pytest-xdist begin with different scenes, and each takes those that the other has not begun.
+    """
+    from support.brief_runs import few_starts, whole_timings
+    from support.engines import CORE
+    from support.scenes import with_few_members
+
+    from dropspin.comparisons.results.store import load_results, save
+    from dropspin.comparisons.running.run import run
+
+    engines = ["wang", "mujoco", "pybullet"]
+
+    def make_scene(name: str, folder: Path) -> None:
+        with few_starts(), whole_timings():
+            save(run(with_few_members(name), engines), folder, compress=False)
 
     def make(folder: Path) -> None:
-        from support.brief_runs import few_starts, whole_timings
-        from support.engines import CORE
-        from support.scenes import with_few_members
+        parts = [load_results(shared(f"core-{name}", partial(make_scene, name))) for name in CORE]
+        save(run(map(with_few_members, CORE), engines, done=parts), folder, compress=False)
 
-        from dropspin.comparisons.results.store import save
-        from dropspin.comparisons.running.run import run
-
-        with few_starts(), whole_timings():
-            results = run(map(with_few_members, CORE), ["wang", "mujoco", "pybullet"])
-        save(results, folder, compress=False)
-
+    last_first = os.environ.get("PYTEST_XDIST_WORKER", "gw0").endswith(("1", "3", "5", "7"))
+    for name in reversed(CORE) if last_first else CORE:
+        shared(f"core-{name}", partial(make_scene, name))
     return shared("core-run", make)

@@ -83,7 +83,8 @@ def compute_states(all_states: Sequence[States]) -> Iterator[tuple[slice, Array,
         if rows < 2:
             continue
         setup = Setup.of_starts([item.scene for item in batch])
-        states, lag = np.stack([item.motion.states for item in batch]), np.array([item.motion.velocity_lag for item in batch])
+        states = np.stack([item.motion.states for item in batch]) if len(batch) > 1 else batch[0].motion.states[np.newaxis]
+        lag = np.array([item.motion.velocity_lag for item in batch])
         dt, last_row = np.full(len(batch), batch[0].motion.t[1] - batch[0].motion.t[0]), np.full(len(batch), rows - 1)
         together, valid = motions_side_by_side(setup, states, dt, lag, last_row, np.inf)
         if valid.all():

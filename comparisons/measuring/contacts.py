@@ -20,8 +20,7 @@ In an impact with friction these laws permit a gain of energy (T. R. Kane, 1984)
 reverses within an impact, Coulomb's law at each instant (E. J. Routh, 1860) may leave a slip along F, against the third law.
 """
 
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,10 +37,11 @@ if TYPE_CHECKING:
 
 RESIDUALS = ("pull", "cone_excess", "push", "gap")
 """The laws of contact, by the name of their violation."""
+AT_ONCE = 16_384
+"""Time steps of which intermediate results are held in memory at once."""
 
 
-@dataclass(frozen=True, eq=False)
-class ContactResiduals:
+class ContactResiduals(NamedTuple):
     """The violations of the laws of contact in each time step in which something beside gravity changes the velocity; 0 if a law holds.
 
     Attributes:
@@ -67,7 +67,7 @@ class ContactResiduals:
     def of_motion(self, number: int) -> "ContactResiduals":
         """The residuals of one of several motions."""
         first, last = np.searchsorted(self.motion, (number, number + 1))
-        return ContactResiduals(*(getattr(self, field.name)[first:last] for field in fields(self)))
+        return ContactResiduals(*(values[first:last] for values in self))
 
 
 def contact_residuals(scene: Scenario, states: Array, motions: Motions) -> ContactResiduals:
@@ -80,6 +80,14 @@ def contact_residuals(scene: Scenario, states: Array, motions: Motions) -> Conta
     """
     assert scene.floor is not None
     motion, steps = np.nonzero(np.atleast_2d(motions.states.touching))
+    blocks = np.array_split(np.arange(len(steps)), 1 + len(steps) // AT_ONCE)
+    parts = [_residuals(scene, states, motions, motion[block], steps[block]) for block in blocks]
+    return ContactResiduals(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _residuals(scene: Scenario, states: Array, motions: Motions, motion: NDArray[np.intp], steps: NDArray[np.intp]) -> ContactResiduals:
+    """The violations in some steps of some motions."""
+    assert scene.floor is not None
     in_contact = np.atleast_2d(motions.in_contact)[motion, steps]
     rows, lowest = states.reshape(-1, *states.shape[-2:]), np.atleast_2d(motions.states.lowest_height)
     before, after = (Trajectory.from_states(np.zeros(len(steps)), rows[motion, row]) for row in (steps, steps + 1))

@@ -127,13 +127,15 @@ class EngineStudy:
         Raises:
             Breakdown: There are no motions from these starts.
         """
-        scene, size, found = self.own.scene, len(phases), []
+        scene, size = self.own.scene, len(phases)
         sets, before = perturbed(scene, [phase.scene for phase in phases], precision), size + (size > 1)
         at_once = max(1, MOST_ROWS // (size * scene.steps(progress.dt)))
-        for first in range(0, len(sets), at_once):
 
-            def on_simulations(done: int, _: int, earlier: int = before + first * size) -> None:
-                self.on_progress(progress._replace(done=earlier + done, total=before + len(sets) * size))
+        def values(first: int) -> Iterator[Mapping[str, float]]:
+            """From some of the sets; their motions are dropped when it ends."""
+
+            def on_simulations(done: int, _: int) -> None:
+                self.on_progress(progress._replace(done=before + first * size + done, total=before + len(sets) * size))
 
             starts = list(chain(*sets[first : first + at_once]))
             motions = self.processes.call(entry, motions_from, starts, progress.dt, on_simulations=on_simulations)
@@ -141,8 +143,9 @@ class EngineStudy:
                 raise motions
             for number in range(0, len(motions), size):
                 cases = compare(motions[number : number + size], phases)
-                found.append({metric.name: metric.value_or_nan(cases) for metric in metrics_for(scene, self.own.truth)})
-        return found
+                yield {metric.name: metric.value_or_nan(cases) for metric in metrics_for(scene, self.own.truth)}
+
+        return list(chain(*map(values, range(0, len(sets), at_once))))
 
     def rows(self, *, is_extrapolated: bool) -> Iterator[Measurement]:
         """All rows of the engine: at each time step, and its orders and asymptotic errors if there are enough time steps."""

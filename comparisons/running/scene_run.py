@@ -56,13 +56,9 @@ def run_scene(
     distances: list[Measurement] = []
     studies = [EngineStudy(own, entry, processes, on_progress) for entry in entries]
     for dt in dts:
-        phases = phases_at(own, dt)
-        cases = [study.run_at(dt, phases, timings[own.scene.name, study.entry.label, dt]) for study in studies]
-        compared = [(study.outcomes[-1], of_study) for study, of_study in zip(studies, cases, strict=True) if of_study]
-        for first, second in combinations(compared, 2):
-            agreements += _agreement(own, first, second)
-        if dt == min(dts) and own.scene.recording is None:
-            distances += _distances_to_other_laws(own.scene, dt, phases, compared)
+        differences, from_other_laws = _at_step(own, studies, dt, timings, is_finest=dt == min(dts))
+        agreements += differences
+        distances += from_other_laws
     by_label = {study.entry.label: study for study in studies}
     for study in studies:
         study.calibrated = by_label.get(calibrated_label(study.entry.label) or "")
@@ -71,6 +67,21 @@ def run_scene(
         rows = list(study.rows(is_extrapolated=is_sufficient(sorted(dts))))
         judged += [*rows, *study.explaining_settings(rows)]
     return _results(own, studies, [*judged, *distances], agreements, stamp)
+
+
+def _at_step(
+    own: StartPhase, studies: Sequence[EngineStudy], dt: float, timings: Timings, *, is_finest: bool
+) -> tuple[list[Measurement], list[Measurement]]:
+    """Run every engine at a time step; the differences between engines, and at the finest step the distances to other impact laws.
+
+    The motions that are compared are in memory until it returns.
+    """
+    phases = phases_at(own, dt)
+    cases = [study.run_at(dt, phases, timings[own.scene.name, study.entry.label, dt]) for study in studies]
+    compared = [(study.outcomes[-1], of_study) for study, of_study in zip(studies, cases, strict=True) if of_study]
+    agreements = [row for pair in combinations(compared, 2) for row in _agreement(own, *pair)]
+    measures_distances = is_finest and own.scene.recording is None
+    return agreements, list(_distances_to_other_laws(own.scene, dt, phases, compared)) if measures_distances else []
 
 
 def _agreement(own: StartPhase, first: Compared, second: Compared) -> Iterator[Measurement]:

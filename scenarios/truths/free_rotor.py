@@ -33,6 +33,8 @@ SMALLEST_M1 = 1e-290
 """Smallest value for which the squares of the elliptic functions do not underflow; below it, a body turns over only after more than 300
 e-foldings.
 """
+AT_ONCE = 16_384
+"""Times for which matrices are held in memory at once; more would be slower."""
 
 Exact = NDArray[Any]
 """An array of exact rationals."""
@@ -161,6 +163,10 @@ class AsymmetricTop:
         """Orientations (n, 4) and angular velocities (n, 3), world frame, at times [s], shape (n,)."""
         from scipy.spatial.transform import Rotation
 
+        if len(t) > AT_ONCE:
+            parts = map(self, np.array_split(t, -(-len(t) // AT_ONCE)))
+            orientations, spins = zip(*parts, strict=True)
+            return np.concatenate(orientations), np.concatenate(spins)
         at = self._elliptic(t)
         triads, spins = self._body_frame(at)
         angle = self._precession(t, at)

@@ -23,12 +23,16 @@ def flat():
 
 
 @pytest.fixture(scope="module")
-def rows(core_run, flat):
-    """The measurements and predictions of all scenes that have predictions, with all engines."""
-    with few_starts():
-        beyond = ds.run([name for name in dict.fromkeys([*FREE, *flat]) if name not in CORE], ["wang", "mujoco", "pybullet"])
-    runs = ds.load_results(core_run, arrays=False), beyond, ds.run(FREE, "wang[rotation=exact]", [4e-3, 1e-3])
-    return tuple(pd.concat([getattr(one, kind) for one in runs], ignore_index=True) for kind in ("measurements", "predictions"))
+def rows_of(core_run):
+    """Call it with scenes and time steps: the measurements and predictions of these, or of more, with the three engines."""
+    core = ds.load_results(core_run, arrays=False)
+
+    def rows(names, dts, *others):
+        with few_starts():
+            beyond = ds.run([name for name in names if name not in CORE], ["wang", "mujoco", "pybullet"], dts)
+        return tuple(pd.concat([getattr(one, kind) for one in (core, beyond, *others)]) for kind in ("measurements", "predictions"))
+
+    return rows
 
 
 def measured_and_predicted(rows, names, dts):
@@ -38,9 +42,10 @@ def measured_and_predicted(rows, names, dts):
 
 
 @pytest.mark.extended
-def test_errors_in_flight_are_the_predicted_ones(rows):
+def test_errors_in_flight_are_the_predicted_ones(rows_of):
     """All errors of `wang`, and of the others where the spin is steady, to a relative 1e-6 or to 1e-9 (measured 2e-10): 250 values."""
-    measured, predicted = measured_and_predicted(rows, FREE, [4e-3, 1e-3])
+    dts = [4e-3, 1e-3]
+    measured, predicted = measured_and_predicted(rows_of(FREE, dts, ds.run(FREE, "wang[rotation=exact]", dts)), FREE, dts)
     assert len(predicted) > 250
     assert set(predicted.index.get_level_values("engine")) == set(ENGINES)
     np.testing.assert_allclose(measured, predicted, rtol=1e-6, atol=1e-9)
@@ -49,9 +54,9 @@ def test_errors_in_flight_are_the_predicted_ones(rows):
 
 
 @pytest.mark.parametrize("dt", [2e-3, 1e-3])
-def test_errors_of_flat_bounces_are_the_predicted_ones(rows, flat, dt):
+def test_errors_of_flat_bounces_are_the_predicted_ones(rows_of, flat, dt):
     """To what n phases leave of the speed at detection, g dt/(2n), and of the depth there, (1 - e²) u dt/(2n); and to the next order."""
-    measured, predicted = measured_and_predicted(rows, flat, [dt])
+    measured, predicted = measured_and_predicted(rows_of(flat, [dt]), flat, [dt])
     assert len(flat) >= 5
     for key, value in predicted.items():
         scene, share = load(key[0]), 1 / (2 * phases_of(key[0]))

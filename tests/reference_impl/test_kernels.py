@@ -255,6 +255,7 @@ def test_kernels_compiled_at_the_same_time_are_not_stored_as_each_other(package,
     assert fall(package, program + "print(spin('note'), spin('exact'))") == known
 
 
+@pytest.mark.extended
 def test_user_s_cache_setting_survives_first_use_in_many_threads():
     """Kernels declared at once by several threads leave numba's setting unchanged."""
     program = (

@@ -57,6 +57,7 @@ def test_row_of_the_page_is_that_of_the_program(monkeypatch):
     assert f"| {' | '.join(map(laboratory.cell, row[:8]))} |" in re.sub(r" \| [^|]* \| [^|]* \|$", " |", page, flags=re.MULTILINE)
 
 
+@pytest.mark.extended
 def test_energy_is_accounted_for():
     """Start, changes and end add up; the numbers are those of the page to 1 %."""
     _, start, flight, floor, wall, gain, end = laboratory.budget("wang")

@@ -215,10 +215,12 @@ def test_unknown_engines_and_releases_are_refused(stub, tmp_path):
     assert stub.asked == []
 
 
-def test_a_release_is_measured_in_an_environment_in_which_it_hides_the_running_one(monkeypatch):
-    """The engine is dropspin's own, of which a package of another version is installed; the values are those of this process."""
+@pytest.fixture
+def installed(monkeypatch):
+    """Call it with a name: in the place of pip, a package of this name and of version 9.9 is written into each new environment."""
+    real = environments.run
 
-    def pip_writes(name):
+    def install(name):
         def replaced(command, stopping):
             if "pip" not in command:
                 return real(command, stopping)
@@ -228,10 +230,14 @@ def test_a_release_is_measured_in_an_environment_in_which_it_hides_the_running_o
             (packages / f"{name}-9.9.dist-info/METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 9.9\n")
             return 0, ""
 
-        return replaced
+        monkeypatch.setattr(environments, "run", replaced)
 
-    real = environments.run
-    monkeypatch.setattr(environments, "run", pip_writes("dropspin"))
+    return install
+
+
+def test_a_release_is_measured_in_an_environment_in_which_it_hides_the_running_one(installed):
+    """The engine is dropspin's own, of which a package of another version is installed; the values are those of this process."""
+    installed("dropspin")
     found = measured(PLAN, "wang", "9.9", 60.0, Event())
     motion = ds.simulate("spin-principal", "wang", 0.01)
     values = ds.measure("spin-principal", motion)
@@ -240,7 +246,11 @@ def test_a_release_is_measured_in_an_environment_in_which_it_hides_the_running_o
     assert {row["metric"]: row["value"] for row in rows} == pytest.approx(values, rel=0.0, abs=0.0, nan_ok=True)
     assert {row["trajectory"] for row in rows} == {sha256(motion.states.tobytes())}
     assert found["versions"].startswith("dropspin 9.9, numpy ")
-    monkeypatch.setattr(environments, "run", pip_writes("another"))
+
+
+@pytest.mark.extended
+def test_a_release_that_another_one_hides_is_not_measured(installed):
+    installed("another")
     with pytest.raises(Breakdown, match=r"^not runnable: exit code 1: version .* is imported instead of 9\.9$"):
         measured(PLAN, "wang", "9.9", 60.0, Event())
 

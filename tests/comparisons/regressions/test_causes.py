@@ -111,6 +111,7 @@ def test_planted_cause_is_named_where_metrics_change_in_steps_and_where_two_caus
     assert consistent_with(Made(title="planted", change=change), *scenes) == f"Possible cause of the asymptotic errors: {words}."
 
 
+@pytest.mark.extended
 def test_missing_gyroscopic_term_is_named():
     words = "angular velocity stays constant, as without the gyroscopic term or with the inertia of a ball"
     assert consistent_with(WithoutGyroscopicTerm(), "spin-asymmetric", "drop-ball") == f"Possible cause of the asymptotic errors: {words}."

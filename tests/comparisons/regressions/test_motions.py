@@ -40,6 +40,7 @@ def test_noise_of_one_ulp_is_found_in_its_first_step():
     assert compare(before, after).motions == [EqualMotions("engine", 0, 2, "drop-ball", DT, 26), EqualMotions("wang", 2, 2)]
 
 
+@pytest.mark.extended
 def test_dependence_on_the_order_of_scenes_is_found():
     """A state that outlives a simulation: the second scene of a run starts from another one."""
 

@@ -96,6 +96,7 @@ def test_engine_that_follows_the_law_of_the_scene_is_away_from_the_others_and_pa
     assert "failed" not in set(own["verdict"])
 
 
+@pytest.mark.sample(1)
 def test_laws_that_every_impact_obeys_are_judged_whatever_the_law(turning):
     """No pull, friction within its cone, no gain of energy: both engines pass in these."""
     for engine in turning.engines:

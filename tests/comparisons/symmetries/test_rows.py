@@ -135,6 +135,7 @@ def test_engine_that_returns_nan_has_a_row_for_its_run_alone(tmp_path):
     assert len(ds.load_results(tmp_path / "run").table) == len(results.table)
 
 
+@pytest.mark.extended
 def test_run_without_symmetries_is_not_compared_with_accepted_ones(stored):
     accepted, _ = ds.accept(ds.load_results(stored), ds.Baseline(), "first", datetime.date(2026, 11, 24))
     checked = ds.check(ds.run(SCENE, "mujoco", DTS), accepted).results

@@ -147,9 +147,9 @@ INTERRUPTED = (
     "-e",
     "pybullet",
     "--dt",
-    "0.004",
+    "0.008",
     "--dt",
-    "0.002",
+    "0.004",
 )
 
 
@@ -212,6 +212,7 @@ def test_resume_runs_a_different_request_again(tmp_path):
 DRAWN = ("run", "drop-ball", "--draw", "2", "-e", "mujoco", "--dt", "0.01", "--dt", "0.005", "--time-limit", "100")
 
 
+@pytest.mark.extended
 def test_drawn_scenes_are_run_and_reproduced(tmp_path):
     """Besides those named; the seed and the command are on the terminal, in run.json and in the reports, and give the same scenes again."""
     with mock.patch("secrets.randbits", return_value=5):

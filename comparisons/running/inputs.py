@@ -16,7 +16,9 @@ SceneLike = Scenario | str | Path | Mapping[str, Any]
 """A scene, its catalogue name, the path of its file, or a mapping with the same keys as a file."""
 FEWEST_STEPS = 4
 MOST_STEPS = 2_000_000
-"""Steps of one run; 32 start phases of that many fit into a machine's memory."""
+"""Steps of a motion."""
+MOST_STATES = 2_000_000
+"""States of the motions that a run compares: one of each engine, and three more; with what is computed of them they take less than 1 GiB."""
 
 
 @dataclass(frozen=True)
@@ -102,14 +104,16 @@ def as_scenes(scenes: SceneLike | Iterable[SceneLike], default: Iterable[str] = 
     return chosen
 
 
-def verify_time_step(scene: Scenario, dt: float) -> None:
-    """Raise `DropspinError` unless a scene is a sensible number of steps of dt [s]."""
+def verify_time_step(scene: Scenario, dt: float, engines: int = 0) -> None:
+    """Raise `DropspinError` unless a scene is a sensible number of steps of dt [s], also for a run that compares `engines`."""
+    most = MOST_STATES // (engines + 3) if engines else MOST_STEPS
+    so_that = f", because the motions of {engines} engine{'s' * (engines > 1)} are in memory together," if engines else ""
     if isinstance(dt, bool) or not isinstance(dt, int | float | np.floating):
         raise DropspinError(f"dt: got {described_value(dt)}; a time step is a number of seconds.")
-    if not (np.isfinite(dt) and dt > 0.0 and FEWEST_STEPS <= scene.duration / dt + 1e-9 < MOST_STEPS + 1):
+    if not (np.isfinite(dt) and dt > 0.0 and FEWEST_STEPS <= scene.duration / dt + 1e-9 < most + 1):
         raise DropspinError(
             f"dt: got {dt!r} s; scene {scene.name!r} lasts {scene.duration:g} s, so a step must be "
-            f"at least {scene.duration / MOST_STEPS:.10g} s and at most {scene.duration / FEWEST_STEPS:.10g} s."
+            f"at least {scene.duration / most:.10g} s{so_that} and at most {scene.duration / FEWEST_STEPS:.10g} s."
         )
 
 

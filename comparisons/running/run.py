@@ -132,7 +132,7 @@ def _request(
     for scene, truth, *_ in requested:
         verify_expectations(scene, truth, labels)
         for step in dts:
-            verify_time_step(scene, step)
+            verify_time_step(scene, step, len(entries))
     if len(set(dts)) < len(dts):
         raise DropspinError(f"dt: a time step is given twice ({', '.join(f'{step:g}' for step in dts)}); give each once.")
     if len(set(labels)) < len(labels):

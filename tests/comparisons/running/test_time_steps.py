@@ -10,14 +10,17 @@ from dropspin.scenarios import DropspinError, load
 BODY = {"shape": "sphere", "radius": 0.1, "mass": 1.0}
 
 
+@pytest.mark.parametrize(("engines", "most"), [(0, MOST_STEPS), (1, 500_000), (3, 333_333)])
 @pytest.mark.parametrize("duration", [2000.0, 600.0, 1.0 / 3.0, 0.7, 1e-3])
-def test_bounds_of_the_message_are_time_steps_that_are_accepted(duration):
-    """Also as many steps as a run may have, exactly."""
+def test_bounds_of_the_message_are_time_steps_that_are_accepted(duration, engines, most):
+    """Also as many steps as a motion, or those of a run, may have, exactly."""
     scene = load({"duration": duration, "body": BODY})
-    for dt in (duration / MOST_STEPS, duration / FEWEST_STEPS):
-        verify_time_step(scene, dt)
-    for dt in (duration / (MOST_STEPS + 2), duration / (FEWEST_STEPS - 1), 1e-310):
+    for dt in (duration / most, duration / FEWEST_STEPS):
+        verify_time_step(scene, dt, engines)
+    for dt in (duration / (most + 2), duration / (FEWEST_STEPS - 1), 1e-310):
         with pytest.raises(DropspinError) as caught:
-            verify_time_step(scene, dt)
-        for bound in re.findall(r"(?:at least|at most) (\S+) s", str(caught.value)):
-            verify_time_step(scene, float(bound))
+            verify_time_step(scene, dt, engines)
+        bounds = re.findall(r"(?:at least|at most) (\S+) s", str(caught.value))
+        assert len(bounds) == 2
+        for bound in bounds:
+            verify_time_step(scene, float(bound), engines)

@@ -6,6 +6,7 @@ No state is synchronised: sources take velocities as they are beside positions, 
 import math
 import re
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,17 +29,14 @@ def quantity(name: str) -> Quantity:
         UnknownName: There is none of that name.
     """
     if at := AT.fullmatch(name):
-        return _at(at[1], float(at[2]))
+        return partial(_at, at[1], float(at[2]))
     verify_known("quantity", [name], QUANTITIES)
     return lambda scene, motion: float(QUANTITIES[name](scene, motion))
 
 
-def _at(name: str, time: float) -> Quantity:
-    def value(scene: Scenario, motion: Trajectory) -> float:
-        row = int(np.argmin(np.abs(motion.t - time)))
-        return float(motion.position[row, 1] if name == "height" else np.linalg.norm(motion.velocity[row]))
-
-    return value
+def _at(name: str, time: float, _: Scenario, motion: Trajectory) -> float:
+    row = int(np.argmin(np.abs(motion.t - time)))
+    return float(motion.position[row, 1] if name == "height" else np.linalg.norm(motion.velocity[row]))
 
 
 def _momentum_errors(scene: Scenario, motion: Trajectory) -> Array:

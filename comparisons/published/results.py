@@ -46,13 +46,6 @@ class Result:
     verdict: Verdict | Literal[""] = ""
 
 
-def without_value(result: Result, breakdown: Breakdown, why_not: str) -> Result:
-    """The result of an engine that gave no value; `why_not` is why none can give it here, empty if one can."""
-    if why_not or breakdown.verdict == "declined":
-        return replace(result, status="not reproducible", reason=why_not or breakdown.reason)
-    return replace(result, reason=breakdown.reason, verdict=breakdown.verdict)
-
-
 BOUND = re.compile(r"([<>≤]) (.+)")
 TOLERANCE = "±"
 ABSENT = "–"
@@ -97,6 +90,26 @@ def agreement(printed: str, value: float, significant: int = 0) -> Agreement:
         return Agreement(shown, value - expected, abs(value - expected) <= tolerance)
     here = f"{value:.{significant}g}" if significant else _rounded(printed, value)
     return Agreement(here, value - float(printed), here == printed)
+
+
+def with_value(result: Result, value: float | Breakdown, why_not: str, significant: int = 0) -> Result:
+    """A result with the value that an engine gave, or with why it gave none.
+
+    Args:
+        result: The result without a value.
+        value: The value.
+        why_not: Why no engine can give the published value here; empty if one can.
+        significant: As in `agreement`.
+    """
+    if isinstance(value, Breakdown):
+        if why_not or value.verdict == "declined":
+            return replace(result, status="not reproducible", reason=why_not or value.reason)
+        return replace(result, reason=value.reason, verdict=value.verdict)
+    if result.published == ABSENT:
+        return replace(result, here=f"{value:.{SHOWN}g}", status="for comparison")
+    match = agreement(result.published, value, significant)
+    result = replace(result, here=match.here, difference=match.difference, status=match.status)
+    return replace(result, status="not reproducible", reason=why_not) if why_not and not match.agrees else result
 
 
 def _rounded(printed: str, value: float) -> str:

@@ -1,13 +1,12 @@
 """The study of the command `dropspin reproduce`: run what a source describes, and compare the digits."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 
 from dropspin.comparisons.engines.packages import numbers_of
 from dropspin.comparisons.published.formulas import FORMULAS
 from dropspin.comparisons.published.quantities import quantity
-from dropspin.comparisons.published.results import ABSENT, SHOWN, Result, agreement, without_value
+from dropspin.comparisons.published.results import Result, with_value
 from dropspin.comparisons.published.sources import Case, Group, Source, sources
 from dropspin.comparisons.published.tosses import acosta_cube
 from dropspin.comparisons.running.entries import engine_entry
@@ -80,11 +79,4 @@ def _of_case(source: Source, group: Group, case: Case, entry: EngineEntry, proce
     values: Sequence[float | Breakdown] = [measured] * len(case.printed) if isinstance(measured, Breakdown) else measured
     for name, printed, value in zip(group.quantities, case.printed, values, strict=True):
         result = Result(source.name, group.tool, f"{case.case}: {name}" if case.case else name, printed, "", group.by, "not run")
-        if isinstance(value, Breakdown):
-            yield without_value(result, value, group.why_not)
-        elif printed == ABSENT:
-            yield replace(result, here=f"{value:.{SHOWN}g}", status="for comparison")
-        else:
-            match = agreement(printed, value, source.significant)
-            result = replace(result, here=match.here, difference=match.difference, status=match.status)
-            yield replace(result, status="not reproducible", reason=group.why_not) if group.why_not and not match.agrees else result
+        yield with_value(result, value, group.why_not, source.significant)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.published.results import SHOWN, Result, agreement, without_value
+from dropspin.comparisons.published.results import SHOWN, Result, with_value
 from dropspin.comparisons.published.sources import Source
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
@@ -102,14 +102,12 @@ def _of_run(source: Source, run: Run, tosses: list[Array], processes: EngineProc
     entry = engine_entry(run["by"]) if run["by"] else EngineEntry("", None, "missing", why_not)
     values = processes.call(entry, _simulated, source.parameters["cube"], run, tosses)
     for quantity, printed in run["printed"].items():
+        value = values if isinstance(values, Breakdown) else values[quantity]
         result = Result(source.name, run["tool"], f"{run['case']}: {quantity}", printed, "", run["by"], "not run")
-        if isinstance(values, Breakdown):
-            yield without_value(result, values, why_not)
-            continue
-        match = agreement(printed, values[quantity])
-        result = replace(result, here=match.here, status=match.status, difference=match.difference)
-        here = f"{values[quantity]:.{SHOWN}g}"
-        yield replace(result, here=here, status="not reproducible", reason=why_not) if why_not else result
+        result = with_value(result, value, why_not)
+        if why_not and not isinstance(value, Breakdown):
+            result = replace(result, here=f"{value:.{SHOWN}g}", status="not reproducible", reason=why_not)
+        yield result
 
 
 def _simulated(entry: EngineEntry, cube: Cube, run: Run, tosses: list[Array]) -> dict[str, float]:

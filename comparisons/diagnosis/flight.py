@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import DECAY_TIME, KEPT, NOTEWORTHY, OF_FALLS, Answer, judged, vector_text
-from dropspin.comparisons.diagnosis.loose_body import LooseBody
+from dropspin.comparisons.diagnosis.loose_body import STILL, LooseBody
 from dropspin.comparisons.diagnosis.parts import DIRECTIONS
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.scenarios.rotations import unrotate
@@ -66,7 +66,7 @@ def spin(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
 def _decay(body: LooseBody, start: Array, dt: float, tau: float) -> float:
     """The time at which a spin is 1/e of its start [s], interpolated between steps as an exponential."""
     steps = min(math.ceil(3.0 * tau / dt) + 3, LONGEST)
-    speeds = np.linalg.norm(body.motions(start[np.newaxis], dt, steps, np.zeros(3), floor=False)[0, :, SPIN], axis=1)
+    speeds = np.linalg.norm(body.motions(start[np.newaxis], dt, steps, STILL, floor=False)[0, :, SPIN], axis=1)
     below = np.flatnonzero(speeds <= SPEED / math.e)
     if not len(below):
         return math.inf
@@ -79,9 +79,8 @@ def _decay(body: LooseBody, start: Array, dt: float, tau: float) -> float:
 
 def _turned(body: LooseBody, starts: Array, dt: float) -> Array:
     """The states after a second without gravity and contacts, of one start, shape (13,), or of several, shape (n, 13)."""
-    motions = body.motions(np.atleast_2d(starts), dt, round(TURN / dt), np.zeros(3), floor=False)
-    found: Array = motions[:, -1]
-    return found[0] if starts.ndim == 1 else found
+    motions = body.motions(np.atleast_2d(starts), dt, round(TURN / dt), STILL, floor=False)
+    return motions[:, -1].reshape(starts.shape)
 
 
 def tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
@@ -112,11 +111,10 @@ def worst_tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     tried = np.concatenate([DIRECTIONS[DIRECTIONS[:, 1] >= 0.0], DIAGONALS, [OBLIQUE]]) @ axes.T
     by_direction = _energy_gain(body, starts := np.array([facts.start(spin=SPEED * axis) for axis in tried]), _turned(body, starts, dt))
     worst = int(np.argmax(np.abs(by_direction)))
-    of_worst = Answer("tumble", "largest energy change", "%", vector_text(tried[worst]), measured=float(by_direction[worst]))
-    answers = [of_worst]
+    answers = [Answer("tumble", "largest energy change", "%", vector_text(tried[worst]), measured=float(by_direction[worst]))]
     if abs(by_direction[worst] - exact) > 100.0 * NOTEWORTHY:
         speed = _threshold(lambda w: _gain(body, facts.start(spin=w * tried[worst]), dt), SLOWEST, FASTEST)
-        answers.append(replace(of_worst, quantity="spin for 1 %", unit="rad/s", measured=speed))
+        answers.append(replace(answers[0], quantity="spin for 1 %", unit="rad/s", measured=speed))
     if abs(_gain(body, start, dt) - exact) > 100.0 * NOTEWORTHY:
         step = _threshold(lambda dt: _gain(body, start, dt), 1e-2 * dt, dt)
         answers.append(replace(STATED, quantity="dt for 1 %", unit="s", physical=math.nan, measured=step))

@@ -78,10 +78,8 @@ class BodyText:
             tensor = next(inertial.every("inertia"), None)  # of URDF
             names = ("diaginertia", "fullinertia", "mass")
             written["inertia"] = [inertial.setting(name) for name in names] if tensor is None else [tensor.words]
-        for name, settings in written.items():
-            first = next((setting for setting in settings if setting is not None), None)
-            found |= {} if first is None else {name: first}
-        return found
+        # Of several places, the first one counts.
+        return found | {name: setting for name, settings in written.items() for setting in reversed(settings) if setting is not None}
 
     @cached_property
     def _joint(self) -> list[Element]:

@@ -219,11 +219,9 @@ class PyBulletBody(LooseBody):
 
     def _settings(self) -> dict[str, Setting]:
         """The settings that matter, in the words of the file or as PyBullet's defaults."""
-        found = {name: Setting(text) for name, text in DEFAULTS.items()}
-        for tag, attribute, name in WRITTEN:
-            for element in self._model.links[self._name].every(tag):
-                found |= {name: setting} if (setting := element.setting(attribute)) else {}
-        return found
+        link = self._model.links[self._name]
+        written = {name: at for tag, attribute, name in WRITTEN for one in link.every(tag) if (at := one.setting(attribute))}
+        return {name: Setting(text) for name, text in DEFAULTS.items()} | written
 
     def _ignored(self, restitution: float) -> Sequence[Ignored]:
         """What the file says and PyBullet changes or does not use; `restitution` is that of the surface."""

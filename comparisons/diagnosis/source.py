@@ -89,8 +89,7 @@ def read_source(path: Path) -> Element:
     Raises:
         DropspinError: A file is missing, not XML, too large, declares entities, or includes itself.
     """
-    elements = [0]
-    return _read(path, path.parent, (), elements)
+    return _read(path, path.parent, (), [0])
 
 
 def _read(path: Path, home: Path, within: tuple[Path, ...], count: list[int]) -> Element:

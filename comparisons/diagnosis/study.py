@@ -6,14 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, Answer, Finding
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble, worst_tumble
 from dropspin.comparisons.diagnosis.friction import creep, roll, slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
-from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.diagnosis.remedies import Question, Targets, answers_to
 from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.comparisons.running.entries import present_entry
@@ -24,6 +23,10 @@ from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.bodies.mesh_files import read_mesh
 
+if TYPE_CHECKING:  # each engine is imported in its own process alone
+    from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
+    from dropspin.comparisons.diagnosis.pybullet_body import PyBulletModel
+
 READERS = {".xml": ("mujoco",), ".mjcf": ("mujoco",), ".urdf": ("mujoco", "pybullet"), ".obj": ("mujoco",), ".stl": ("mujoco",)}
 """The engines that read a file, by its ending."""
 MESH = """<mujoco><asset><mesh name="mesh" file="{path}"/></asset><worldbody><geom type="plane" size="0 0 1"/>
@@ -33,16 +36,6 @@ Found = TypeVar("Found")
 OF_FACTS = ("name", "engine", "version", "dt", "mass", "surface", "friction")
 """What a diagnosis has as an engine has it in force."""
 QUESTIONS: tuple[Question, ...] = (fall, spin, tumble, worst_tumble, impact, rest, slide, creep, roll)
-
-
-class ModelFile(Protocol):
-    """A model file as an engine reads it."""
-
-    def bodies(self, wanted: Sequence[str], loose: bool) -> list[str]:
-        """The names of the bodies to diagnose."""
-
-    def body(self, name: str, on: str | None) -> LooseBody:
-        """One of them, above what it lands on."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +174,7 @@ def _checked(given: str, found: Found | DropspinError | Breakdown) -> Found:
 
 
 @lru_cache(maxsize=1)
-def _file(engine: str, path: Path, given: str) -> ModelFile:
+def _file(engine: str, path: Path, given: str) -> "MuJoCoModel | PyBulletModel":
     """A model as the engine of this process reads it, once for all bodies."""
     if engine == "mujoco":
         from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel

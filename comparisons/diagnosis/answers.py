@@ -41,8 +41,7 @@ class Remedy(NamedTuple):
     runs: bool = True
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """An error or an effect of settings that exceeds a threshold.
 
     Attributes:

@@ -2,9 +2,8 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,8 +27,7 @@ OF_CONTACT = ("friction", "lateral_friction", "restitution", "rolling_friction",
 Ignored = tuple[str, Setting, str]
 
 
-@dataclass(frozen=True)
-class Link:
+class Link(NamedTuple):
     """A link, with its centre of mass and its inertial frame in the frame of the body's first link.
 
     Attributes:

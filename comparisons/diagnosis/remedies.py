@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
+from typing import NamedTuple
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, NOTEWORTHY, REBOUND, Answer, Finding, Kind, Remedy
 from dropspin.comparisons.diagnosis.landing import rebound
@@ -18,8 +19,7 @@ Question = Callable[[LooseBody, Sequence[float]], list[Answer]]
 """A function of a body and of time steps, of which the first is judged."""
 
 
-@dataclass(frozen=True)
-class Targets:
+class Targets(NamedTuple):
     """What the user wants of a body: a coefficient of restitution and of friction; None for no target."""
 
     restitution: float | None = None
@@ -78,7 +78,7 @@ def _explained(body: LooseBody, finding: Finding, effect: Callable[[frozenset[st
     if not explaining:
         return finding
     settings = tuple(dict.fromkeys(name for names in explaining for name in names))
-    return replace(finding, settings=settings, shares=tuple((", ".join(names), share) for names, share in explaining.items()))
+    return finding._replace(settings=settings, shares=tuple((", ".join(names), share) for names, share in explaining.items()))
 
 
 def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable[[tuple[str, ...], float], list[Answer]]) -> Finding:
@@ -95,7 +95,7 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
         return finding
     kind: Kind = "setting" if finding.kind == "model" and () not in found else finding.kind
     settings = finding.settings if finding.shares else next(iter(found)) or ("timestep",)
-    return replace(finding, kind=kind, settings=settings, remedies=tuple(found.values()))
+    return finding._replace(kind=kind, settings=settings, remedies=tuple(found.values()))
 
 
 def _tries(body: LooseBody, answer: Answer, finding: Finding) -> Iterator[tuple[tuple[str, ...], float]]:

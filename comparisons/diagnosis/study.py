@@ -3,10 +3,10 @@
 import math
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, Answer, Finding
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble, worst_tumble
@@ -38,8 +38,7 @@ OF_FACTS = ("name", "engine", "version", "dt", "mass", "surface", "friction")
 QUESTIONS: tuple[Question, ...] = (fall, spin, tumble, worst_tumble, impact, rest, slide, creep, roll)
 
 
-@dataclass(frozen=True)
-class BodyDiagnosis:
+class BodyDiagnosis(NamedTuple):
     """The diagnosis of one body with one engine.
 
     Attributes:
@@ -209,7 +208,7 @@ def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | 
     facts, known = body.facts, _known(*given_to, on, targets)
     key = body.likeness
     if key in known:
-        return replace(known[key], name=name)
+        return known[key]._replace(name=name)
     answers = inertia(facts) + [answer for question in QUESTIONS for answer in answers_to(question, body)]
     if facts.surface:
         answers.append(Answer("friction", COEFFICIENT, "1", measured=facts.friction))

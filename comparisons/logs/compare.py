@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -118,8 +119,7 @@ class LogComparison:
     left_out: Mapping[str, str]
 
 
-@dataclass(frozen=True, eq=False)
-class _Given:
+class _Given(NamedTuple):
     """What an engine continues: launches in a scene with a time step [s], and the header that says where the tracked point is."""
 
     what: str

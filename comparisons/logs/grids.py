@@ -11,8 +11,8 @@ those of several impacts, keep their weight beside those that one value fits wel
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -49,8 +49,7 @@ TIE = 1e-3
 """Of sums of losses: parameters with which a sum is larger by no more are as good."""
 
 
-@dataclass(frozen=True, eq=False)
-class Problem:
+class Problem(NamedTuple):
     """What all engines are given: the tosses, and those from starts that differ by a standard deviation in each of 12 directions."""
 
     scene: Scenario
@@ -62,8 +61,7 @@ class Problem:
     variances: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Profile:
+class Profile(NamedTuple):
     """The estimates of an engine in resamples of the tosses.
 
     Attributes:

@@ -16,6 +16,7 @@ Source: G. Wahba, J. R. Stat. Soc. B 40 (1978), 364 (the integrated Wiener proce
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +30,7 @@ SLOWEST, FASTEST = -2.0, 4.0
 """Range of log10 of the slow error at the end of the median flight over the white noise."""
 
 
-@dataclass(frozen=True)
-class Noise:
+class Noise(NamedTuple):
     """Standard deviations: of the white noise in the unit of the values, and of w'' in that unit / s^1.5."""
 
     white: float

@@ -2,9 +2,8 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path, PurePath
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -41,8 +40,7 @@ BATCH_ROWS = 20_000
 """Steps of tosses of about one length that are held in memory at a time."""
 
 
-@dataclass(frozen=True, eq=False)
-class Launches:
+class Launches(NamedTuple):
     """Where engines take over.
 
     Attributes:

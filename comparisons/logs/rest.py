@@ -5,7 +5,7 @@
 s is the scale of the recorded lengths, r_k the vertices and p the tracked point in the frame of the shape, δ the error of p.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,7 @@ LEVEL = 0.04
 """Heights of vertices, as a share of the size of the body, that count as equal: a turn of 2 degrees."""
 
 
-@dataclass(frozen=True, eq=False)
-class Rests:
+class Rests(NamedTuple):
     """Tosses that end at rest.
 
     Attributes:

@@ -54,13 +54,9 @@ class BodyText:
         if self._file.is_urdf:
             values = next(inertial.every("inertia"), inertial).attributes
             numbers = [float(values.get(name, 0.0)) for name in OF_URDF]
-        elif "diaginertia" in values:
-            numbers = [*map(float, values["diaginertia"].split()), 0.0, 0.0, 0.0]
-        elif "fullinertia" in values:
-            numbers = [float(value) for value in values["fullinertia"].split()]
         else:
-            return None
-        return np.array(symmetric(numbers))
+            numbers = [float(value) for value in values.get("diaginertia", values.get("fullinertia", "")).split()]
+        return np.array(symmetric([*numbers, 0.0, 0.0, 0.0][:6])) if numbers else None
 
     @cached_property
     def settings(self) -> dict[str, Setting]:

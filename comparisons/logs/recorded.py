@@ -32,9 +32,8 @@ def _read_as(toss: Toss, header: Header, rolled: int, inverse: bool) -> Toss:
 
 def of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
     """Of quaternions that another reading explains: bodies then rest on faces, or turn as free bodies do."""
-    other = "wxyz" if log.header.quaternion == "xyzw" else "xyzw"
+    other, rolled = ("wxyz", -1) if log.header.quaternion == "xyzw" else ("xyzw", 1)
     inverse = "body-to-world" if log.header.rotation == "world-to-body" else "world-to-body"
-    rolled = -1 if other == "wxyz" else 1
     level, count = level_share(log)
     inertia = log.header.body.inertia_tensor
     is_ball = bool(np.allclose(inertia, inertia[0, 0] * np.eye(3)))  # a spin is constant then, in every reading

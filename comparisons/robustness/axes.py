@@ -5,6 +5,7 @@ First come the values of axes: the initial ones of a scan, and the midpoint of t
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -64,14 +65,10 @@ def restitution_between(low: float, high: float, ratio: float) -> float | None:
     return None if 1.0 - low <= (1.0 - high) * ratio else 1.0 - math.sqrt((1.0 - low) * (1.0 - high))
 
 
-def whole_power_between(base: float) -> Between:
+def whole_power_between(base: float, low: float, high: float, _: float) -> float | None:
     """`Between` of integer powers of a base; there is no value between adjacent powers."""
-
-    def between(low: float, high: float, ratio: float) -> float | None:
-        powers = round(math.log(high / low, base))
-        return None if powers < 2 else low * base ** (powers // 2)
-
-    return between
+    powers = round(math.log(high / low, base))
+    return None if powers < 2 else low * base ** (powers // 2)
 
 
 class Axis(NamedTuple):
@@ -140,7 +137,7 @@ AXES = {
         Axis(
             "mass", "kg", masses, lambda nominal: nominal.scene.body.mass,
             to.of_scene(lambda scene, mass: in_units(scene, mass=mass / scene.body.mass)),
-            between=whole_power_between(2.0), invariant=True,
+            between=partial(whole_power_between, 2.0), invariant=True,
         ),
         Axis(
             "restitution", "1", lambda nominal: [0.0, 0.5, 0.9, 0.99, 0.999, 0.9999], _restitution,
@@ -151,11 +148,11 @@ AXES = {
         Axis("duration", "s", durations, lambda nominal: nominal.scene.duration, to.of_scene(changed)),
         Axis(
             "size", "m", sizes, lambda nominal: nominal.scene.body.size, to.of_scene(with_size),
-            applies=lambda scene: scene.floor is not None, between=whole_power_between(4.0),
+            applies=lambda scene: scene.floor is not None, between=partial(whole_power_between, 4.0),
         ),
         Axis(
             "scale", "1", lambda nominal: [value / nominal.scene.body.size for value in sizes(nominal)], lambda nominal: 1.0, to.with_scale,
-            between=whole_power_between(4.0), invariant=True,
+            between=partial(whole_power_between, 4.0), invariant=True,
         ),
     )
 }  # fmt: skip

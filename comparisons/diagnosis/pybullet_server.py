@@ -26,7 +26,6 @@ class Server(Connection):
         super().__init__()
         self.holds: object = None
         self.numbers = (-1, -1)
-        self.libc = ctypes.CDLL(None)
 
     def clear(self) -> None:
         """Remove all; files that changed are read again."""
@@ -70,7 +69,7 @@ def load(given: str, file: str, flags: int = 0) -> int:
 @contextmanager
 def _printing_to(file: int) -> Iterator[None]:
     """Send what this process prints, PyBullet's C++ included, to a file."""
-    flush = server().libc.fflush
+    flush = ctypes.CDLL(None).fflush
     sys.stdout.flush()
     sys.stderr.flush()
     flush(None)

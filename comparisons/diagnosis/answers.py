@@ -1,7 +1,7 @@
 """The answers of a diagnosis: measured values beside exact ones, with findings and remedies."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -145,3 +145,8 @@ def vector_text(axis: Array) -> str:
     rounded = [round(value, 3) + 0.0 for value in axis.tolist()]
     names = [name for name, value in zip("xyz", rounded, strict=True) if value]
     return names[0] if len(names) == 1 else f"({', '.join(f'{value:g}' for value in rounded)})"
+
+
+def digits(values: Iterable[float]) -> str:
+    """Numbers with three digits."""
+    return ", ".join(f"{value:.3g}" for value in values)

@@ -87,10 +87,9 @@ def tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The change of energy of a spin about no principal axis, which turns freely, and the error of the attitude."""
     if not _tumbles(body):
         return []
-    start, after = _stated(body, dts[0])
+    start, after, exact = _stated(body, dts[0])
     ends = [_turned(body, start, dt) for dt in dts]
     gains = [float(_energy_gain(body, start, end)) for end in ends]
-    exact = float(_energy_gain(body, start, after))
     of_stated = judged(body, STATED, dts, gains, [exact] * len(dts))
     if body.facts.unknown:
         return [of_stated]
@@ -103,8 +102,7 @@ def worst_tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     facts, dt = body.facts, dts[0]
     if not _tumbles(body) or facts.unknown:
         return []
-    start, after = _stated(body, dt)
-    exact = float(_energy_gain(body, start, after))
+    start, _, exact = _stated(body, dt)
     if abs(exact) > 100.0 * NOTEWORTHY:  # of damping, which no direction and no step is without
         return []
     axes = facts.principal[1]
@@ -129,10 +127,11 @@ def _tumbles(body: LooseBody) -> bool:
     return bool(np.ptp(moments) >= 1e-9 * moments.max()) and not is_slowed
 
 
-def _stated(body: LooseBody, dt: float) -> tuple[Array, Array]:
-    """The start of the stated spin, and the exact state with the settings in force after a second in steps of dt."""
+def _stated(body: LooseBody, dt: float) -> tuple[Array, Array, float]:
+    """The start of the stated spin; with the settings in force, the exact state after a second in steps of dt and the change of energy."""
     start = body.facts.start(spin=SPEED * OBLIQUE)
-    return start, body.facts.in_force(start, np.array([0.0, round(TURN / dt) * dt]), 0.0)[-1]
+    after = body.facts.in_force(start, np.array([0.0, round(TURN / dt) * dt]), 0.0)[-1]
+    return start, after, float(_energy_gain(body, start, after))
 
 
 def _gain(body: LooseBody, start: Array, dt: float) -> float:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import Answer, Finding, Remedy, vector_text
+from dropspin.comparisons.diagnosis.answers import Answer, Finding, Remedy, digits, vector_text
 from dropspin.comparisons.diagnosis.loose_body import Facts
 from dropspin.scenarios.bodies.possible_moments import largest_multiple
 from dropspin.scenarios.state import Array
@@ -49,10 +49,10 @@ def _impossible(facts: Facts, given: Array, remedies: tuple[Remedy, ...]) -> Ite
 
 def _components(tensor: Array) -> str:
     """A tensor [kg m²], shape (3, 3), about the body's axes; without its products where they are small."""
-    found = f"ixx, iyy, izz = {', '.join(f'{value:.3g}' for value in np.diag(tensor))}"
+    found = f"ixx, iyy, izz = {digits(np.diag(tensor))}"
     products = tensor[[0, 0, 1], [1, 2, 2]]
     if np.abs(products).max() > SMALL * tensor.max():
-        found += f", ixy, ixz, iyz = {', '.join(f'{value:.3g}' for value in products)}"
+        found += f", ixy, ixz, iyz = {digits(products)}"
     return f"{found} kg m²"
 
 

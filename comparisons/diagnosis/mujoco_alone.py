@@ -47,7 +47,7 @@ class MuJoCoAlone:
         self.head = file.heads[name]
         self.group = file.group(self.head)
         self.geoms = [geom for geom in range(old.ngeom) if old.geom_bodyid[geom] in self.group]
-        names = list(file.names(GEOM, old.ngeom))
+        names = list(file.names(GEOM))
         for geom in self.geoms:
             if int(old.geom_type[geom]) not in map(int, MODELLED):
                 kind = mujoco.mjtGeom(int(old.geom_type[geom])).name.removeprefix("mjGEOM_").lower()

@@ -185,7 +185,7 @@ class MuJoCoBody(LooseBody):
 
     @cached_property
     def _names(self) -> list[str]:
-        return list(self._file.names(GEOM, self._file.model.ngeom))
+        return list(self._file.names(GEOM))
 
     def _rest_depth(self, pose: Array) -> float:
         """The depth of a body that rests on one point, or on several that share its weight, below the surface [m]; NaN of others."""

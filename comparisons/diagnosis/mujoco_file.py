@@ -75,15 +75,15 @@ class MuJoCoFile:
             self.refusal, self._spec.compiler.balanceinertia = one_line(error), True
             return self._spec.compile()
 
-    def names(self, kind: Any, number: int) -> dict[str, int]:
-        """The numbers of objects by name; one without a name is called by its kind and number."""
-        what = "body" if kind == BODY else "geom"
+    def names(self, kind: Any) -> dict[str, int]:
+        """The numbers of bodies or geometries by name; one without a name is called by its kind and number."""
+        what, number = ("body", self.model.nbody) if kind == BODY else ("geom", self.model.ngeom)
         return {mujoco.mj_id2name(self.model, kind, one) or f"{what} {one}": one for one in range(number)}
 
     @cached_property
     def heads(self) -> dict[str, int]:
         """The bodies that move against their parents, by name; of a URDF file, whose root is welded to the world, that too."""
-        welded, bodies = self.model.body_weldid, self.names(BODY, self.model.nbody)
+        welded, bodies = self.model.body_weldid, self.names(BODY)
         static = [body for body in bodies.values() if body and welded[body] == 0]
         found = {name: body for name, body in bodies.items() if body and welded[body] == body}
         return {name: body for name, body in bodies.items() if body in static[:1]} | found if self.is_urdf else found
@@ -154,7 +154,7 @@ class MuJoCoFile:
 
     def surfaces(self, own: Sequence[int]) -> list[int]:
         """The planes, then the boxes, of the world that some geometries collide with, and if there is none, a plane that is added."""
-        model, geoms = self.model, self.names(GEOM, self.model.ngeom)
+        model, geoms = self.model, self.names(GEOM)
         still = [geom for geom in geoms.values() if model.body_weldid[model.geom_bodyid[geom]] == 0 and geom not in own]
         ranked = [geom for kind in SURFACES for geom in still if model.geom_type[geom] == kind and geom != geoms[ADDED]]
         found = [geom for geom in ranked if any(self.contact(one, geom) for one in own)]
@@ -168,7 +168,7 @@ class MuJoCoFile:
         """
         if wanted is None:
             return next(iter(self.surfaces(own)), None)
-        others = {name: geom for name, geom in self.names(GEOM, self.model.ngeom).items() if geom not in own}
+        others = {name: geom for name, geom in self.names(GEOM).items() if geom not in own}
         verify_known("the model's geometry", [wanted], others)
         if int(self.model.geom_type[others[wanted]]) not in map(int, SURFACES):
             raise DropspinError(f"--on {wanted}: is neither a plane nor a box; name one of these.")

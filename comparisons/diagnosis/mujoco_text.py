@@ -1,11 +1,12 @@
 """A body of an MJCF or URDF file in the file's own words: its settings with their lines, and what MuJoCo changes or does not use."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 
 import mujoco
 import numpy as np
 
+from dropspin.comparisons.diagnosis.answers import digits
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile
 from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
@@ -145,8 +146,3 @@ class BodyText:
                 for found in [] if element is None else element.every(tag):
                     if found.number("value", value) != value:
                         yield tag, found.words, "not read"
-
-
-def digits(values: Sequence[float]) -> str:
-    """Numbers with three digits."""
-    return ", ".join(f"{value:.3g}" for value in values)

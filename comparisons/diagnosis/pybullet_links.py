@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dropspin.comparisons.diagnosis.answers import digits
 from dropspin.comparisons.diagnosis.parts import Part, mesh_shape, solid
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.source import Element, Setting
@@ -104,11 +105,10 @@ class Link(NamedTuple):
         if written is None:
             yield "inertial", Setting("no inertial", self.element.file, self.element.line), f"missing: the mass is {self.mass:g} kg"
         elif np.abs(written - self.inertia).max() > SAME * np.abs(written).max():
-            moments = ", ".join(f"{moment:.3g}" for moment in self.dynamics[2])
             times = " times <inertia_scaling>" if next(self.element.every("inertia_scaling"), None) else ""
             is_ball = len(self.geometry) == 1 and next(self.element.every("sphere"), None) is not None
             of = "the sphere" if is_ball else "the bounding box of the collision geometry"
-            made = f"replaced by that of {of}{times}: {moments} kg m²"
+            made = f"replaced by that of {of}{times}: {digits(self.dynamics[2])} kg m²"
             yield "inertia", next(self.element.every("inertia")).words, made
         for element in self.element.every(*OF_CONTACT):
             is_read = element.parent is not None and element.parent.tag == "contact"

@@ -76,7 +76,7 @@ class BodyText:
             names = ("diaginertia", "fullinertia", "mass")
             written["inertia"] = [inertial.setting(name) for name in names] if tensor is None else [tensor.words]
         # Of several places, the first one counts.
-        return found | {name: setting for name, settings in written.items() for setting in reversed(settings) if setting is not None}
+        return found | {name: one for name, several in written.items() for one in reversed(several) if one}
 
     @cached_property
     def _joint(self) -> list[Element]:

@@ -177,5 +177,6 @@ def _refined(axis: Array, tried: Array, lower: Array, upper: Array) -> Array | N
     encloses = (axis[0] < low or axis[0] == tried[0]) and (high < axis[-1] or axis[-1] == tried[-1])
     if encloses and step <= max(FINE_ENOUGH * (core_high - core_low), FINEST):
         return None
-    core = np.linspace(core_low - MARGIN * step, core_high + MARGIN * step, GRID - 2)
-    return np.unique(np.clip([low - MARGIN * step, *core, high + MARGIN * step], tried[0], tried[-1]))
+    margin = MARGIN * step
+    first, begin, end, last = np.clip([low - margin, core_low - margin, core_high + margin, high + margin], tried[0], tried[-1])
+    return np.unique([first, *np.linspace(begin, end, GRID - 2), last])

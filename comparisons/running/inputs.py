@@ -18,7 +18,7 @@ FEWEST_STEPS = 4
 MOST_STEPS = 2_000_000
 """Steps of a motion."""
 MOST_STATES = 2_000_000
-"""States of the motions that a run compares: one of each engine, and three more; with what is computed of them they take less than 1 GiB."""
+"""States of the motions that a run compares: one of each engine, and three more; with what is computed of them they stay below 1 GiB."""
 
 
 @dataclass(frozen=True)

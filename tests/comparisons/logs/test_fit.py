@@ -8,6 +8,7 @@ from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.logs import fit as log_fits
 from dropspin.comparisons.logs.fit import log_fit
 from dropspin.comparisons.logs.grids import Profile
+from dropspin.comparisons.logs.grids import _refined as refined_grid
 from dropspin.scenarios.variations import with_values
 
 
@@ -92,6 +93,16 @@ def test_friction_of_any_engine_has_the_interval_of_a_mean_over_engines():
 
 def profile(resampled, value):
     return Profile(resampled, resampled, np.full(2, value), 0.0)
+
+
+@pytest.mark.parametrize("end", [0.0, 1.0])
+def test_grid_around_estimates_at_the_end_of_the_first_grid_has_all_of_its_values(end):
+    """Without the values beyond it, a cubic spline through the others needs at least four."""
+    first = np.linspace(0.0, 1.0, 7)
+    found = refined_grid(first, first, np.full(50, end), np.full(50, end))
+    assert len(found) == 5
+    assert 0.0 <= found[0] < found[-1] <= 1.0
+    assert end in found
 
 
 @pytest.mark.extended

@@ -247,15 +247,9 @@ def _message(row: Row) -> str:
     at = "" if row["dt"] is None else f" at {row['dt']:g} s"
     unit = "" if row["unit"] == "1" else f" {row['unit']}"
     value = "undefined" if row["value"] is None else f"{row['value']:.3g}{unit}"
-    match row["lower"], row["upper"]:
-        case None, None:
-            expected = ""
-        case None, upper:
-            expected = f", expected ≤ {upper:.3g}"
-        case lower, None:
-            expected = f", expected ≥ {lower:.3g}"
-        case lower, upper:
-            expected = f", expected {lower:.3g} … {upper:.3g}"
+    lower, upper = ("" if row[end] is None else f"{row[end]:.3g}" for end in ("lower", "upper"))
+    bounds = f"{lower} … {upper}" if lower and upper else f"≥ {lower}" if lower else f"≤ {upper}" if upper else ""
+    expected = f", expected {bounds}" if bounds else ""
     return f"{SUBJECTS.get(prefix, prefix)} {row['metric']}{at} is {value}{expected}".strip()
 
 
@@ -392,13 +386,10 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         rows = by_key.values()
         tally = (sum(row[key] == value for row in rows) for key, value in (("verdict", "passed"), ("fails", True), ("verdict", "known")))
         lines.append((engine, scene, *map(str, tally), max(rows, key=itemgetter("fails"))["message"]))
-    widths = [max(map(len, column)) for column in list(zip(*lines, strict=True))[:-1]]
+    layout = [f"{side}{max(map(len, column))}" for side, column in zip("<<>>>", zip(*lines, strict=True), strict=False)]
     terminalreporter.section(NAME)
     for *cells, message in lines:
-        padded = [
-            cell.rjust(width) if column > 1 else cell.ljust(width) for column, (cell, width) in enumerate(zip(cells, widths, strict=True))
-        ]
-        terminalreporter.write_line("  ".join([*padded, message]))
+        terminalreporter.write_line("  ".join([*map(format, cells, layout), message]))
     runs = config.stash[RUNS]
     if runs.baseline and not any(row["kind"] == "baseline" for by_key in judged.values() for row in by_key.values()):
         terminalreporter.write_line(f"{runs.baseline} has no accepted results of these runs; no results were compared with it.")

@@ -5,7 +5,7 @@ A page begins with the summary; a terminal, on which the last lines are read fir
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from dropspin.reports.plots.chart import Chart
@@ -76,8 +76,7 @@ class Charts(Part):
     charts: "Sequence[Chart]" = ()
 
 
-@dataclass(frozen=True)
-class Document:
+class Document(NamedTuple):
     """A document. Lists and tables without content are not shown.
 
     Attributes:

@@ -1,8 +1,7 @@
 """The differences between two runs, and the one to which a change of results is attributed."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from dropspin.comparisons.engines.options import engine_name, spelled
 from dropspin.comparisons.engines.registry import BUILT_IN
@@ -28,8 +27,7 @@ OWN_ENGINE = "wang"
 CORRECTION = "a correction of dropspin, not a change of the engine"
 
 
-@dataclass(frozen=True)
-class Attribution:
+class Attribution(NamedTuple):
     """The cause to which the changes of an engine's results are attributed.
 
     Attributes:

@@ -1,7 +1,7 @@
 """Two runs compared, and histories of runs: the results that changed, and the causes to which the changes are attributed."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -27,8 +27,7 @@ from dropspin.comparisons.results.results import Results
 from dropspin.scenarios import DropspinError
 
 
-@dataclass(frozen=True, eq=False)
-class Changes:
+class Changes(NamedTuple):
     """The differences between two runs.
 
     Attributes:
@@ -111,8 +110,7 @@ def _in_one_only(old: Results, new: Results) -> list[str]:
     ]
 
 
-@dataclass(frozen=True)
-class Move:
+class Move(NamedTuple):
     """A run in which results of an engine changed.
 
     Attributes:
@@ -130,8 +128,7 @@ class Move:
     attribution: Attribution
 
 
-@dataclass(frozen=True, eq=False)
-class History:
+class History(NamedTuple):
     """The results of several runs in the order of their start times.
 
     Attributes:

@@ -52,7 +52,7 @@ def html_report(
     scenes = [_scene(of_scene, number, charts.get(name, {}), name in failing) for number, (name, of_scene) in by_scene]
     return page(
         "report.html",
-        **vars(summary),
+        **summary._asdict(),
         engines=results.engines,
         references=_references(results),
         provenance=results.provenance,

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,7 @@ or two.
 """
 
 
-@dataclass(frozen=True, eq=False)
-class Impacts:
+class Impacts(NamedTuple):
     """Impacts on the floor and on walls.
 
     Attributes:

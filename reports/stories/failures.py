@@ -3,9 +3,8 @@
 import math
 import shlex
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
 from operator import attrgetter, itemgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 from dropspin.comparisons.judging.convergence import STUDIES
 from dropspin.comparisons.judging.verdicts import FAILURES
@@ -22,8 +21,7 @@ MOST_ON_PAGE, MOST_ON_TERMINAL = 24, 6
 """Largest number of sentences on the failures of one engine, on a page and on a terminal; JUnit, JSON and the report have all failures."""
 
 
-@dataclass(frozen=True)
-class Failure:
+class Failure(NamedTuple):
     """A failure: the failed rows of one metric of one engine in one scene, described by the first of these rows.
 
     Attributes:

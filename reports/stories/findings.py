@@ -4,9 +4,8 @@ import math
 import statistics
 from collections import Counter
 from collections.abc import Collection, Hashable, Iterator, Mapping
-from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -30,8 +29,7 @@ SAME_SIZE = 0.999
 """Smallest ratio of an error to the largest one at which the two count as equal."""
 
 
-@dataclass(frozen=True, eq=False)
-class Counts:
+class Counts(NamedTuple):
     """The number of checks of a run by verdict, and the checks that show an expected error.
 
     Attributes:
@@ -64,8 +62,7 @@ def counts(results: Results) -> Counts:
     )
 
 
-@dataclass(frozen=True)
-class ProfileComparison:
+class ProfileComparison(NamedTuple):
     """An engine with default settings compared with the same engine with calibrated settings.
 
     Attributes:

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -43,8 +42,7 @@ CHOICE = "Error: the largest known fault, limitation or failure, else the leadin
 """Which error a row of the matrix shows."""
 
 
-@dataclass(frozen=True)
-class Leading:
+class Leading(NamedTuple):
     """The errors of a scene in one metric at its finest time step.
 
     Attributes:

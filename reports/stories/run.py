@@ -1,7 +1,8 @@
 """The output of `dropspin run`: the overview of a run, computed once for terminal, HTML and Markdown."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.results.results import Results, Status
@@ -26,8 +27,7 @@ from dropspin.reports.stories.numbers import listed
 from dropspin.scenarios.text import counted
 
 
-@dataclass(frozen=True)
-class Overview:
+class Overview(NamedTuple):
     """The first part of a report.
 
     Attributes:

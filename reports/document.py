@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from dropspin.reports.plots.chart import Chart
 
 
+Rows = list[dict[str, str]]
+"""The rows of a table, by column."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Part:
     """A part of a document.

@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.reports.replay.motions import Motion, Replay
 from dropspin.scenarios.bodies.hull import Outline, convex_hull
 from dropspin.scenarios.rotations import rotate
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 PANEL = np.array([110.0, 84.0])
 LEFT, TOP = 104.0, 18.0

@@ -7,9 +7,10 @@ import numpy as np
 from dropspin.comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.chart import Chart, Line, draw
-from dropspin.reports.plots.style import Array, at_one_step, step_of
+from dropspin.reports.plots.style import at_one_step, step_of
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 from dropspin.scenarios.mechanics import apex
+from dropspin.scenarios.state import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

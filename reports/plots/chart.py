@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dropspin.reports.plots.colours import Dashes, human_label
-from dropspin.reports.plots.style import LINE, ROUNDING, Array, ink, is_grey, label_powers
+from dropspin.reports.plots.style import LINE, ROUNDING, ink, is_grey, label_powers
+from dropspin.scenarios.state import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

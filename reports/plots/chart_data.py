@@ -9,7 +9,7 @@ import numpy as np
 
 from dropspin.reports.plots.chart import Chart, Line
 from dropspin.reports.plots.colours import human_label
-from dropspin.reports.plots.style import Array
+from dropspin.scenarios.state import Array
 
 DIGITS = 6
 """Number of significant digits of positions along an axis."""

@@ -11,7 +11,8 @@ from dropspin.comparisons.measuring.tolerances import TRUTH_ACCURACY, scale
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.chart import Chart, Line, draw
 from dropspin.reports.plots.colours import engine_styles
-from dropspin.reports.plots.style import Array, metric_label, plain
+from dropspin.reports.plots.style import metric_label, plain
+from dropspin.scenarios.state import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,7 +6,8 @@ import numpy as np
 
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.chart import Chart, Line, draw
-from dropspin.reports.plots.style import TIME, Array, at_one_step, stride
+from dropspin.reports.plots.style import TIME, at_one_step, stride
+from dropspin.scenarios.state import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,8 +11,9 @@ from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import TRUTH_ACCURACY, scale
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.chart import Chart, Line, draw
-from dropspin.reports.plots.style import ROUNDING, TIME, Array, at_one_step, metric_label, stride
+from dropspin.reports.plots.style import ROUNDING, TIME, at_one_step, metric_label, stride
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, UnknownName, truth_for
+from dropspin.scenarios.state import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

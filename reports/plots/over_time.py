@@ -8,10 +8,11 @@ import numpy as np
 
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.chart import FLAT, Chart, Line, draw
-from dropspin.reports.plots.style import MOST_POINTS, TIME, Array, at_one_step, stride
+from dropspin.reports.plots.style import MOST_POINTS, TIME, at_one_step, stride
 from dropspin.scenarios import Scenario, Trajectory, Truth, reference_for
 from dropspin.scenarios.mechanics import angular_momentum, energy
 from dropspin.scenarios.rotations import angle_between_orientations, rotate
+from dropspin.scenarios.state import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,9 +13,10 @@ import numpy as np
 
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.chart import Chart, Line, draw
-from dropspin.reports.plots.style import MOST_POINTS, Array, at_one_step, stride
+from dropspin.reports.plots.style import MOST_POINTS, at_one_step, stride
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 from dropspin.scenarios.rotations import unrotate
+from dropspin.scenarios.state import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

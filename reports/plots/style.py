@@ -9,7 +9,6 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
 
-Array = NDArray[np.float64]
 Kept = TypeVar("Kept")
 ByStep = Mapping[tuple[str, str, float], Kept]
 """Trajectories or ensemble outcomes of a run, by scene, engine and time step."""

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.packages import install_extra
 from dropspin.comparisons.results.folder import written_whole
@@ -16,6 +15,7 @@ from dropspin.reports.replay.motions import Motion, Replay
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.bodies.hull import Outline
 from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.surfaces import Wall
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d import Axes3D
 
-Array = NDArray[np.float64]
 
 FRAME_RATE = 25
 """Frames per second."""

@@ -11,8 +11,7 @@ from dropspin.reports.plots.colours import human_label
 from dropspin.reports.replay.motions import Motion, Replay, axis_and_angle
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import about, unrotate
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 LEVELS = 2**16 - 1
 POSITION_ERROR = 1e-3

@@ -14,9 +14,8 @@ from dropspin.reports.plots.colours import engine_colours
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, reference_for
 from dropspin.scenarios.mechanics import angular_momentum
 from dropspin.scenarios.rotations import angle_between_orientations, conjugate, cross, dot, multiply
-from dropspin.scenarios.state import UP
+from dropspin.scenarios.state import UP, Array
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 MOST_FRAMES = 300

@@ -7,11 +7,12 @@ import numpy as np
 from dropspin.comparisons.measuring.contacts import RESIDUALS, contacts
 from dropspin.comparisons.measuring.requirements import obeys_contact_laws
 from dropspin.comparisons.results.results import Results
+from dropspin.reports.document import Rows
 from dropspin.reports.stories.numbers import formatted
 
 
 @np.errstate(all="ignore")  # an engine may return 1e300
-def worst_contacts(results: Results, scene_name: str) -> list[dict[str, str]]:
+def worst_contacts(results: Results, scene_name: str) -> Rows:
     """A row for each engine whose body touches the floor at the finest time step: number of contacts, largest violation of each law.
 
     The motion is the one from the initial state of the scene. The list is empty if the forces of the floor cannot be computed.

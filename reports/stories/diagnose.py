@@ -11,7 +11,7 @@ import numpy as np
 from dropspin.comparisons.diagnosis.answers import REBOUND, Answer, Finding, Remedy
 from dropspin.comparisons.diagnosis.inertia import MOMENT
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis, Diagnosis
-from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
+from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Rows, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
 from dropspin.reports.stories.numbers import explained_by, formatted, grouped, in_ms, listed, with_unit
 from dropspin.reports.stories.study import Study
@@ -123,7 +123,7 @@ def _overview(body: BodyDiagnosis) -> dict[str, str]:
     }
 
 
-def answer_rows(body: BodyDiagnosis) -> list[dict[str, str]]:
+def answer_rows(body: BodyDiagnosis) -> Rows:
     """A row for each measured value. Equal values for several axes or speeds share a row, as do the moments of inertia."""
     rows = []
     moments = [answer for answer in body.answers if answer.quantity == MOMENT]
@@ -239,7 +239,7 @@ def _settings(body: BodyDiagnosis, finding: Finding) -> list[str]:
     return [str(known[name]) for name in finding.settings if name in known]
 
 
-def differences(bodies: Sequence[BodyDiagnosis]) -> list[dict[str, str]]:
+def differences(bodies: Sequence[BodyDiagnosis]) -> Rows:
     """The measured values in which engines differ, with a column for each engine."""
     by_quantity: dict[str, dict[str, str]] = {}
     for body in bodies:

@@ -8,9 +8,8 @@ from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown, simulate
+from dropspin.reports.document import Rows
 from dropspin.scenarios import DropspinError, load
-
-Rows = list[dict[str, str]]
 
 
 def rows(engines: Sequence[str]) -> Rows:

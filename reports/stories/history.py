@@ -1,7 +1,7 @@
 """The output of `dropspin compare history`: the runs in which results changed."""
 
 from dropspin.comparisons.regressions.comparing import History
-from dropspin.reports.document import Charts, Document, Heading, Part, Sentences, Table
+from dropspin.reports.document import Charts, Document, Heading, Part, Rows, Sentences, Table
 from dropspin.reports.plots.history import result_over_runs
 from dropspin.reports.stories.compare import change_cells
 from dropspin.reports.stories.numbers import capitalized
@@ -29,7 +29,7 @@ def document(history: History) -> Document:
     return Document(f"Results over {len(history.names)} runs", parts)
 
 
-def rows(history: History) -> list[dict[str, str]]:
+def rows(history: History) -> Rows:
     """For each run in which results changed, the results that changed most."""
     return [
         {

@@ -1,6 +1,7 @@
 """The distances of engines to the exact solutions under several laws of impacts with friction, in scenes in which these laws differ."""
 
 from dropspin.comparisons.results.results import Results
+from dropspin.reports.document import Rows
 from dropspin.reports.stories.numbers import formatted, in_ms, quantity, unit
 from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, law_of
 
@@ -11,7 +12,7 @@ NOTE = (
 )
 
 
-def law_rows(results: Results) -> list[dict[str, str]]:
+def law_rows(results: Results) -> Rows:
     """A row for each scene in which the laws differ and each engine with a motion; the law of the scene is marked by *."""
     others = results.table[results.table["kind"] == "other_law"]
     rows = []

@@ -8,7 +8,7 @@ import numpy as np
 
 from dropspin.comparisons.robustness.axes import AXES
 from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, ScanPoint
-from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
+from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Rows, Sentences, Table
 from dropspin.reports.plots.figures import limits_charts
 from dropspin.reports.stories.numbers import duration, left_out
 from dropspin.reports.stories.study import Study
@@ -61,7 +61,7 @@ def nominal(study: RobustnessStudy) -> str:
     )
 
 
-def step_rows(studies: Sequence[RobustnessStudy]) -> list[dict[str, str]]:
+def step_rows(studies: Sequence[RobustnessStudy]) -> Rows:
     """The largest tested time steps at which each engine is accurate and stable, for each scene."""
     rows = []
     for study in studies:
@@ -85,7 +85,7 @@ def _mode(point: ScanPoint) -> str:
     return point.mode.replace("_", " ")
 
 
-def range_rows(study: RobustnessStudy) -> list[dict[str, str]]:
+def range_rows(study: RobustnessStudy) -> Rows:
     """The range in which each engine is sound along each axis, and the failure modes beyond."""
     modes = {engine: _mode(points[0]) for engine, points in study.refinements.items() if points[0].mode != "sound"}
     return [{"axis": scan.axis.label, "engine": scan.engine, **_range(scan, modes.get(scan.engine))} for scan in study.scans]

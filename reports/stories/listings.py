@@ -1,9 +1,9 @@
 """The output of `dropspin list`: the scenes, the engines or the metrics."""
 
+from dropspin.reports.document import Rows
 from dropspin.scenarios.loading import load, names
 from dropspin.scenarios.problems import problems
 
-Rows = list[dict[str, str]]
 LEFT_OUT_FIRST = {"scenes": ("tags", "truth"), "engines": (), "metrics": ("needs", "unit")}
 """The columns of each list that are left out on a narrow terminal."""
 

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from dropspin.comparisons.logs.compare import Error, LogComparison, Pair
 from dropspin.comparisons.logs.log import Finding
-from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
+from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Rows, Sentences, Table
 from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.colours import in_sentence
 from dropspin.reports.plots.intervals import Interval, interval_rows
@@ -96,7 +96,7 @@ def _label(pair: Pair) -> str:
     return f"{pair.first} − {pair.second}"
 
 
-def _error_rows(errors: Sequence[Error]) -> list[dict[str, str]]:
+def _error_rows(errors: Sequence[Error]) -> Rows:
     rows = []
     for (engine, quantity), kinds in grouped(errors, lambda error: (error.engine, error.quantity)).items():
         unit = UNITS[kinds[0].unit][1]
@@ -139,7 +139,7 @@ def _group_sentences(study: LogComparison) -> list[str]:
     return [*sentences, meaning] if study.pairs else []
 
 
-def _part_rows(study: LogComparison) -> list[dict[str, str]]:
+def _part_rows(study: LogComparison) -> Rows:
     rows = []
     for (engine, quantity), parts in grouped(study.parts, lambda part: (part.engine, part.quantity)).items():
         scale, unit = OF[quantity]

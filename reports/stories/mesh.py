@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import ValidationError
 
+from dropspin.reports.document import Rows
 from dropspin.scenarios.bodies import Mesh
 from dropspin.scenarios.bodies.hull import convex_hull
 from dropspin.scenarios.bodies.mesh import is_closed
@@ -17,7 +18,7 @@ IN_MILLIMETRES = 5.0  # m, from which on a body is probably not given in metres
 CONVEX = 1e-6  # largest part of the volume of a hull that is outside of a convex body, by the rounding of a file in single precision
 
 
-def mesh_rows(file: str) -> list[dict[str, str]]:
+def mesh_rows(file: str) -> Rows:
     """The size, the mass properties, the hull and the defects of a mesh, as a solid, or as a surface if it is not closed.
 
     Raises:

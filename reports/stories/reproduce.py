@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.published.results import Result, Status
 from dropspin.comparisons.published.sources import Source
-from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
+from dropspin.reports.document import Document, Heading, Paragraph, Part, Rows, Sentences, Table
 from dropspin.reports.stories.study import Study
 from dropspin.scenarios.text import counted
 
@@ -47,7 +47,7 @@ class Reproduction(Study):
         return Document("Published results", parts)
 
 
-def _table(results: Sequence[Result]) -> list[dict[str, str]]:
+def _table(results: Sequence[Result]) -> Rows:
     """The results of one source: a row for each tool with what computes its values here, followed by a row for each value."""
     rows = []
     for (tool, by), group in groupby(results, key=lambda result: (result.tool, result.by)):
@@ -70,7 +70,7 @@ def _notes(source: Source, results: Sequence[Result]) -> list[str]:
     return [*(f"{tool}, {by}: {why}." if by else f"{tool}: {why}." for tool, by, why in dict.fromkeys(reasons)), *source.remarks]
 
 
-def _summary(results: Sequence[Result]) -> list[dict[str, str]]:
+def _summary(results: Sequence[Result]) -> Rows:
     """The number of results of each status for each source, and their sums."""
     present = [status for status in STATUSES if any(row.status == status for row in results)]
     names = list(dict.fromkeys(row.source for row in results))

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dropspin.comparisons.judging.verdicts import COMBINED, MARKS
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.results.results import Results
-from dropspin.reports.document import Heading, Part, Sentences, Table
+from dropspin.reports.document import Heading, Part, Rows, Sentences, Table
 from dropspin.reports.stories.findings import orders
 from dropspin.reports.stories.impact_laws import law_rows
 from dropspin.reports.stories.numbers import formatted, in_ms, outcome, trend, unit, with_unit
@@ -26,7 +26,7 @@ def scene_parts(results: Results) -> list[Part]:
     return parts
 
 
-def _rows(results: Results) -> list[dict[str, str]]:
+def _rows(results: Results) -> Rows:
     """The metrics of a scene at the finest time step, and the largest difference between independent engines."""
     frame, pairs, dt = results.table, results.agreements, results.table["dt"].min()
     own = frame[(frame["dt"] == dt) & frame["kind"].isin(["truth", "invariant"])]

@@ -8,6 +8,7 @@ import numpy as np
 from dropspin.comparisons.engines.base import EngineBroken
 from dropspin.comparisons.engines.options import spelled
 from dropspin.comparisons.judging.judge import verify_expectations
+from dropspin.reports.document import Rows
 from dropspin.reports.stories.numbers import bound
 from dropspin.reports.stories.scene import left_out, modelled
 from dropspin.scenarios import Scenario, Truth, reference_for
@@ -19,8 +20,6 @@ from dropspin.scenarios.truths import Law, other_laws
 if TYPE_CHECKING:
     from dropspin.comparisons.engines.base import Engine
     from dropspin.comparisons.running.inputs import EngineEntry
-
-Rows = list[dict[str, str]]
 
 
 def scene_rows(scene: Scenario) -> Rows:

@@ -9,7 +9,7 @@ import numpy as np
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.tradeoff.errors import Ladder
 from dropspin.comparisons.tradeoff.points import LEVEL, CostPoint, TradeOff, spread
-from dropspin.reports.document import Charts, Document, Heading, Part, Sentences, Table
+from dropspin.reports.document import Charts, Document, Heading, Part, Rows, Sentences, Table
 from dropspin.reports.plots.figures import tradeoff_charts
 from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, left_out
 from dropspin.reports.stories.study import Study
@@ -83,7 +83,7 @@ def _costs(point: CostPoint | None, worlds: Sequence[int]) -> dict[str, Any]:
     return dict(zip(names, [point.typical_cost, float(point.cost.min()), quartiles, spread(point.cost), *per_world], strict=True))
 
 
-def pareto_front_rows(study: TradeOff) -> list[dict[str, str]]:
+def pareto_front_rows(study: TradeOff) -> Rows:
     """The Pareto front, cheapest first, then the most accurate time step of each dominated engine, then the engines left out."""
     undecided = study.undecided
     shown = sorted({*study.pareto_front, *undecided}, key=lambda point: point.typical_cost)

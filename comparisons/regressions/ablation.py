@@ -39,12 +39,11 @@ def with_explaining_settings(checked: Checked, baseline: Baseline | None, *, imp
     results = checked.results
     failing = regressed(checked.changes)
     failing = failing[failing["kind"].isin(["truth", "invariant"]) & failing["value"].notna()]
-    rows = [
-        row for _, first in failing.groupby("engine", sort=False).head(1).iterrows() for row in _rows(first, results, baseline, imports)
-    ]
-    return (
-        replace(checked, results=replace(results, table=pd.concat([results.table, as_table(rows)], ignore_index=True))) if rows else checked
-    )
+    largest = failing.groupby("engine", sort=False).head(1)
+    rows = [row for _, change in largest.iterrows() for row in _rows(change, results, baseline, imports)]
+    if not rows:
+        return checked
+    return replace(checked, results=replace(results, table=pd.concat([results.table, as_table(rows)], ignore_index=True)))
 
 
 def _rows(changed: "pd.Series[Any]", results: Results, baseline: Baseline, imports: bool) -> Iterator[Measurement]:

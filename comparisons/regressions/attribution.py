@@ -57,10 +57,8 @@ def surroundings(old: Stamp, new: Stamp) -> dict[str, str]:
 def common_settings(stamp: Stamp, engine: str) -> dict[str, str]:
     """The settings that are the same in all cases of an engine, as text, but for long ones."""
     cases = [{name: _text(value) for name, value in case.items()} for case in stamp["settings"].get(engine, {}).values()]
-    names = [name for name in (cases[0] if cases else {}) if name not in VERSIONS]
-    return {
-        name: cases[0][name] for name in names if len(cases[0][name]) <= LONGEST and all(case.get(name) == cases[0][name] for case in cases)
-    }
+    common = [setting for setting in (cases[0] if cases else {}).items() if all(setting in case.items() for case in cases)]
+    return {name: text for name, text in common if name not in VERSIONS and len(text) <= LONGEST}
 
 
 def changed_settings(old: Stamp, new: Stamp, engine: str) -> dict[str, str]:

@@ -59,6 +59,4 @@ def _case(results: Results, row: Mapping[Hashable, Any], baseline: str | None) -
 
 def _printable(text: str) -> str:
     """A text without the characters that XML cannot contain; the error message of an engine may contain such characters."""
-    if text.replace("\n", "").replace("\t", "").isprintable():
-        return text
     return "".join(sign if sign in "\n\t" or sign.isprintable() else "�" for sign in text)

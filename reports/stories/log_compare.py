@@ -92,10 +92,6 @@ def _named(pair: Pair) -> str:
     return f"{in_sentence(pair.first)} − {in_sentence(pair.second)}"
 
 
-def _label(pair: Pair) -> str:
-    return f"{pair.first} − {pair.second}"
-
-
 def _error_rows(errors: Sequence[Error]) -> Rows:
     rows = []
     for (engine, quantity), kinds in grouped(errors, lambda error: (error.engine, error.quantity)).items():
@@ -118,7 +114,7 @@ def interval(value: float, lower: float, upper: float) -> str:
 def _pair_row(pair: Pair) -> dict[str, str]:
     scale, unit = OF[pair.quantity]
     return {
-        "engines": _label(pair),
+        "engines": f"{pair.first} − {pair.second}",
         "error": pair.quantity + unit,
         "difference": interval(scale * pair.difference, scale * pair.lower, scale * pair.upper),
         "differ": "yes" if pair.differs else "not significantly",

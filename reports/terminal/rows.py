@@ -117,10 +117,8 @@ def _widths(columns: Sequence[Sequence[str]], available: int) -> list[int]:
     widths = [max(cell_len(line) for cell in column for line in cell.splitlines() or [""]) for column in columns]
     longest = list(map(_longest_piece, columns))
     while sum(widths) + GAP * len(widths) - 1 > available and max(widths) > 1:
-        widest = max(
-            range(len(widths)), key=lambda number: (widths[number] > longest[number], number > 0 or len(widths) == 2, widths[number])
-        )
-        widths[widest] -= 1
+        ranks = [(widths[number] > longest[number], number > 0 or len(widths) == 2, widths[number]) for number in range(len(widths))]
+        widths[ranks.index(max(ranks))] -= 1
     return widths
 
 

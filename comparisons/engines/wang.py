@@ -124,7 +124,8 @@ class WangBatch(BatchSimulation):
         if differ_in_start_alone(members):
             body, world = reference_body(members[0].body), reference_world(members[0], dt)
         else:
-            body, world = reference_bodies([member.body for member in members]), _reference_worlds(members, dt)
+            body = reference_bodies([member.body for member in members])
+            world = _together([reference_world(member, dt) for member in members])
         self._simulator = reference_impl.Simulator(body, world, dt, methods)
         self._states, self._dt = initial_states(members), dt
 
@@ -150,8 +151,7 @@ def reference_body(body: Body) -> reference_impl.Body:
 
 def reference_bodies(bodies: Sequence[Body]) -> reference_impl.Body:
     """The bodies of an ensemble in the form that the reference implementation takes."""
-    found = [reference_body(body) for body in bodies]
-    return reference_impl.Body(*(np.array([getattr(body, part.name) for body in found]) for part in fields(reference_impl.Body)))
+    return _together([reference_body(body) for body in bodies])
 
 
 def _inertia(body: Body) -> Array:
@@ -211,14 +211,13 @@ def _floor(floor: Floor) -> reference_impl.Floor:
     return _surface(floor)._replace(half_extents=np.array(extents), thickness=thickness)
 
 
-def _reference_worlds(scenes: Sequence[Scenario], dt: float) -> reference_impl.World:
-    """The same of scenes of one structure, with a row for each scene."""
-    worlds = [reference_world(scene, dt) for scene in scenes]
-    return reference_impl.World(*(_in_rows([getattr(world, part.name) for world in worlds]) for part in fields(reference_impl.World)))
+def _together(members: Sequence[Any]) -> Any:
+    """Bodies, or worlds of one structure, as one with a row for each."""
+    return type(members[0])(*(_in_rows([getattr(member, part.name) for member in members]) for part in fields(members[0])))
 
 
 def _in_rows(values: Sequence[Any]) -> Any:
-    """Values of many worlds as one with a row for each: numbers, arrays, tuples of them, or None."""
+    """Values of many bodies or worlds as one with a row for each: numbers, arrays, tuples of them, or None."""
     if not isinstance(values[0], tuple):
         return None if values[0] is None else np.array(values)
     parts = [_in_rows(column) for column in zip(*values, strict=True)]

@@ -3,7 +3,6 @@
 import base64
 import hashlib
 import re
-from functools import cache
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -15,29 +14,6 @@ from dropspin.reports.stories import numbers
 
 LABELS = re.compile(rf"(?<![\w'=/.\[-])(?<!-e )(?<!rerun )(?:{'|'.join(sorted(NAMES, reverse=True))})(?![\w-]|[.:]\w)(?:\[[^\]]*\])?")
 """The labels of engines that have names."""
-
-
-def page(template: str, **content: Any) -> str:
-    """A page from one of the templates in `reports/templates/`."""
-    return _environment().get_template(template).render(content)
-
-
-@cache
-def _environment() -> Environment:
-    environment = Environment(
-        loader=PackageLoader("dropspin.reports"),
-        autoescape=True,
-        keep_trailing_newline=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "outcome", "quantity", "duration")}
-    environment.filters |= {"unbroken": _unbroken, "human": human_label, "minus": with_minus, "names": with_names}
-    environment.filters["formatted"] = lambda value: with_minus(numbers.formatted(value))
-    environment.filters |= {"chart_data": chart_data, "sha256": _base64_sha256}
-    environment.globals |= {"subject": numbers.subject, "marks": MARKS}
-    return environment
 
 
 def with_minus(text: str) -> str:
@@ -58,3 +34,23 @@ def _unbroken(text: str) -> str:
 def _base64_sha256(text: str) -> str:
     """The hash by which a page's policy allows one script, and no other."""
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+ENVIRONMENT = Environment(
+    loader=PackageLoader("dropspin.reports"),
+    autoescape=True,
+    keep_trailing_newline=True,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
+ENVIRONMENT.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "outcome", "quantity", "duration")}
+ENVIRONMENT.filters |= {"unbroken": _unbroken, "human": human_label, "minus": with_minus, "names": with_names}
+ENVIRONMENT.filters["formatted"] = lambda value: with_minus(numbers.formatted(value))
+ENVIRONMENT.filters |= {"chart_data": chart_data, "sha256": _base64_sha256}
+ENVIRONMENT.globals |= {"subject": numbers.subject, "marks": MARKS}
+
+
+def page(template: str, **content: Any) -> str:
+    """A page from one of the templates in `reports/templates/`."""
+    return ENVIRONMENT.get_template(template).render(content)

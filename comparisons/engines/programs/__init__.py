@@ -1,6 +1,5 @@
 """Programs and models with an engine's settings, ready to paste, rendered from templates."""
 
-from functools import cache
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -8,11 +7,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box, Sphere
 
-
-@cache
-def _templates() -> Environment:
-    # Programs and models made of numbers, not pages of user text: nothing to escape.
-    return Environment(loader=PackageLoader(__name__, "."), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False)
+# Programs and models made of numbers, not pages of user text: nothing to escape.
+TEMPLATES = Environment(loader=PackageLoader(__name__, "."), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False)
 
 
 def rendered(template: str, scene: Scenario, **values: Any) -> str:
@@ -22,7 +18,7 @@ def rendered(template: str, scene: Scenario, **values: Any) -> str:
     extents = [body.radius] if isinstance(body, Sphere) else body.vertices.max(axis=0)[[2, 0, 1]].tolist()
     values |= {"shape": "ball" if isinstance(body, Sphere) else "box", "extents": extents, "lowest": extents[-1]}
     values |= {"mass": body.mass, "gravity": -scene.acceleration[1], "restitution": scene.floor.restitution}
-    return _templates().get_template(template).render(values)
+    return TEMPLATES.get_template(template).render(values)
 
 
 def can_be_pasted(scene: Scenario) -> bool:

@@ -1,13 +1,10 @@
 """`dropspin reproduce`."""
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
 from dropspin.reports.commands.options import as_json, output_option, time_limit_option
-
-if TYPE_CHECKING:
-    from dropspin.comparisons.running.processes import ResourceLimits
 
 
 @click.command("reproduce")
@@ -15,7 +12,7 @@ if TYPE_CHECKING:
 @time_limit_option(60.0, "an engine may use for one run")
 @output_option("out/reproduce", "for the tables")
 @as_json
-def reproduce_command(names: tuple[str, ...], resources: "ResourceLimits", output: str, json_output: bool) -> int:
+def reproduce_command(names: tuple[str, ...], output: str, json_output: bool, **options: Any) -> int:
     """Compare published results with those of engines and exact solutions in dropspin.
 
     Each SOURCE has a citation, a scene, and the digits that it prints. Its scene is run, and the values are compared digit by digit; for
@@ -36,6 +33,6 @@ def reproduce_command(names: tuple[str, ...], resources: "ResourceLimits", outpu
     chosen = sources(names)
     with written_study(output, json_output) as keep:
         with share_bar("reproduce") as on_progress:
-            results = reproduce(names, data=data, on_progress=on_progress, resources=resources)
+            results = reproduce(names, data=data, **options, on_progress=on_progress)
         keep(Reproduction(sources=chosen, results=results))
     return exit_code(results)

@@ -1,14 +1,11 @@
 """`dropspin sweep`."""
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
 from dropspin.reports.commands.options import as_json, time_limit_option
 from dropspin.reports.terminal.interrupts import stop_if_interrupted
-
-if TYPE_CHECKING:
-    from dropspin.comparisons.running.processes import ResourceLimits
 
 
 @click.command("sweep")
@@ -18,7 +15,7 @@ if TYPE_CHECKING:
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://host:8786.")
 @time_limit_option(60.0, "an engine may use for one job")
 @as_json
-def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, resources: "ResourceLimits", json_output: bool) -> int:
+def sweep_command(spec: str, output: str, json_output: bool, **options: Any) -> int:
     """Run every job of a grid or random sample over scenes, engines, options, time steps and initial states.
 
     The result of each job is one row of a table in Parquet files. An interrupted sweep keeps the files that were written.
@@ -36,7 +33,7 @@ def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, r
     asked = load_sweep(spec)
     try:
         with jobs_bar(asked.size) as on_progress:
-            run_sweep(asked, output, resume=resume, scheduler=scheduler, resources=resources, on_progress=on_progress)
+            run_sweep(asked, output, **options, on_progress=on_progress)
         stop_if_interrupted()
         rows = view.rows(output)
     except KeyboardInterrupt:

@@ -1,9 +1,7 @@
 """JUnit XML of a run's checks for CI servers: a test suite for each engine, a test case for each row that was judged."""
 
 import math
-from collections.abc import Hashable, Mapping
 from datetime import datetime
-from typing import Any
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
@@ -11,7 +9,7 @@ from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES
 from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.stories.failures import reproduce, what_fails
-from dropspin.reports.stories.numbers import outcome, step, subject
+from dropspin.reports.stories.numbers import Row, outcome, step, subject
 
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "known", "limited", "declined", "missing"}
 
@@ -38,7 +36,7 @@ def junit_xml(results: Results, baseline: str | None = None) -> bytes:
     return bytes(document.tostring())  # type: ignore[no-untyped-call]
 
 
-def _case(results: Results, row: Mapping[Hashable, Any], baseline: str | None) -> TestCase:
+def _case(results: Results, row: Row, baseline: str | None) -> TestCase:
     accepted = "accepted: " if row["kind"] == "baseline" else ""
     what = subject(row["metric"], row["kind"], row["truth"]) or "runs"
     at = "" if math.isnan(row["dt"]) else f" at {step(row['dt'])} s"

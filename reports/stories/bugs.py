@@ -3,13 +3,13 @@
 import math
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Literal
 
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.record.bugs import Bug, Outcome, Verdict, verdict
 from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.stories.numbers import formatted, in_ms, subject, unit
-from dropspin.reports.stories.study import Study
+from dropspin.reports.stories.study import Records, Study
 from dropspin.scenarios.text import counted
 
 FEW = 4
@@ -27,7 +27,7 @@ class KnownBugs(Study):
         """The verdict on each report."""
         return [(bug, verdict(bug, self.outcomes[bug.name])) for bug in self.bugs]
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> Records:
         """A row for each release of each report; a report without a release has one row."""
         blank = Outcome(release="", state="not run")
         return [

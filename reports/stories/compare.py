@@ -1,7 +1,6 @@
 """The output of `dropspin compare`: the changes between two runs."""
 
 import math
-from collections.abc import Hashable, Mapping
 from typing import Any
 
 from dropspin.comparisons.regressions.changes import EqualMotions, SpeedChange
@@ -9,7 +8,7 @@ from dropspin.comparisons.regressions.comparing import Changes
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.stories.failures import reproduce_scenes
-from dropspin.reports.stories.numbers import capitalized, formatted, in_ms, subject
+from dropspin.reports.stories.numbers import Row, capitalized, formatted, in_ms, subject
 from dropspin.scenarios.text import counted
 
 TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "new": "New"}
@@ -51,7 +50,7 @@ def _tables(changes: Changes) -> list[Part]:
     return parts
 
 
-def change_cells(row: Mapping[Hashable, Any]) -> dict[str, str]:
+def change_cells(row: Row) -> dict[str, str]:
     """The result that changed, its time step, and its values before and now."""
     return {
         "result": subject(row["metric"], row["kind"]),
@@ -61,7 +60,7 @@ def change_cells(row: Mapping[Hashable, Any]) -> dict[str, str]:
     }
 
 
-def _row(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
+def _row(row: Row, count: int) -> dict[str, str]:
     """The largest change for an engine in a scene, and how many other results of this engine and scene have changed in the same way."""
     before, after = row["before"], row["value"]
     ratio = abs(after / before) if abs(before) > row["tolerance"] else math.inf  # a ratio of rounding errors is meaningless

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import groupby
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from dropspin.comparisons.diagnosis.study import BodyDiagnosis, Diagnosis
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Rows, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
 from dropspin.reports.stories.numbers import explained_by, formatted, grouped, in_ms, listed, with_unit
-from dropspin.reports.stories.study import Study
+from dropspin.reports.stories.study import Records, Study
 from dropspin.scenarios.text import counted
 
 KINDS = {"changed": "changed by the engine", "model": "engine", "target": "target missed"}
@@ -35,7 +35,7 @@ class Diagnosed(Study):
     study: Literal["diagnosis"] = "diagnosis"
     diagnosis: Diagnosis
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> Records:
         """A row for each measured value and finding, with the places in the file where the settings are written."""
         rows = []
         for body in self.diagnosis.bodies:

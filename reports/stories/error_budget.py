@@ -1,7 +1,7 @@
 """The error budgets of a scene: for each error the asymptotic error with its interval, the cause, and a sentence."""
 
 import math
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable
 from typing import Any
 
 import pandas as pd
@@ -9,7 +9,7 @@ import pandas as pd
 from dropspin.comparisons.judging.convergence import ARTEFACTS, SATURATION
 from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY
 from dropspin.comparisons.results.results import SMALLEST_STATED, Results, is_undecided
-from dropspin.reports.stories.numbers import formatted, observed_order
+from dropspin.reports.stories.numbers import Row, formatted, observed_order
 
 OF = ["metric", "engine"]
 EXPLAINED = {"known": "Expected", "limited": "Known limitation"}
@@ -37,7 +37,7 @@ def error_budgets(results: Results, scene_name: str) -> list[dict[Hashable, Any]
     return [row | {"sentence": _sentence(row)} for row in ordered.to_dict("records")]
 
 
-def _sentence(row: Mapping[Hashable, Any]) -> str:
+def _sentence(row: Row) -> str:
     value, limit, cause = float(row["value"]), float(row["value_of_limit"]), row["cause"]
     if cause == "unresolved":
         if row["unit"] == "rad" and abs(value) > SATURATION:

@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from operator import attrgetter, itemgetter
 from typing import Any, NamedTuple
 
@@ -13,10 +13,9 @@ from dropspin.comparisons.regressions.causes import WrongParameter, causes
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.running.processes import ResourceLimits
 from dropspin.reports.document import Paragraph, Part, Sentences
-from dropspin.reports.stories.numbers import bound, explained_by, formatted, grouped, in_ms, listed, step, subject, word
+from dropspin.reports.stories.numbers import Row, bound, explained_by, formatted, grouped, in_ms, listed, step, subject, word
 from dropspin.scenarios.text import counted, rounded
 
-Row = Mapping[Hashable, Any]
 MOST_ON_PAGE, MOST_ON_TERMINAL = 24, 6
 """Largest number of sentences on the failures of one engine, on a page and on a terminal; JUnit, JSON and the report have all failures."""
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import groupby
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, Sca
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Rows, Sentences, Table
 from dropspin.reports.plots.figures import limits_charts
 from dropspin.reports.stories.numbers import duration, left_out
-from dropspin.reports.stories.study import Study
+from dropspin.reports.stories.study import Records, Study
 
 ACCURATE_AND_STABLE = (
     "Accurate: the engine is sound at this time step and at all smaller ones that were tested. Stable: at all of these time steps, "
@@ -26,7 +26,7 @@ class Limits(Study):
     study: Literal["limits"] = "limits"
     scenes: list[RobustnessStudy]
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> Records:
         """A row for each tested value, and a row for each engine that is missing."""
         return [row for study in self.scenes for row in _rows(study)]
 
@@ -42,7 +42,7 @@ class Limits(Study):
         return Document("Where engines break down", parts, summary)
 
 
-def _rows(study: RobustnessStudy) -> list[dict[str, Any]]:
+def _rows(study: RobustnessStudy) -> Records:
     """A row for each value of each scan and for each smaller time step tried at the nominal values, and one for each engine left out."""
     name, scanned = study.scene.name, {scan.engine for scan in study.scans if scan.axis.name == "step"}
     points = [(scan.engine, scan.axis, point) for scan in study.scans for point in scan.points]

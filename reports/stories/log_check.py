@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from dropspin.reports.document import Charts, Document, Heading, Paragraph, Sent
 from dropspin.reports.plots.chart import Chart, Line
 from dropspin.reports.stories.log_findings import remedy, sentence
 from dropspin.reports.stories.numbers import formatted, grouped
-from dropspin.reports.stories.study import Study, with_all_columns
+from dropspin.reports.stories.study import Records, Study, with_all_columns
 from dropspin.scenarios.text import counted
 
 SMALL = 0.1
@@ -42,7 +42,7 @@ class CheckedLog(Study):
         """The study of a check."""
         return cls(recording=recording, values=list(check.values), findings=list(check.findings), tosses=list(check.tosses))
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> Records:
         """A row for each value, finding and toss; every row has the columns of all three kinds."""
         rows = [{"row": "values", **asdict(value), "note": self._note(value)} for value in self.values]
         for finding in self.findings:

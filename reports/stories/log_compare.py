@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any, Literal
+from typing import Literal
 
 from dropspin.comparisons.logs.compare import Error, LogComparison, Pair
 from dropspin.comparisons.logs.log import Finding
@@ -13,7 +13,7 @@ from dropspin.reports.plots.colours import in_sentence
 from dropspin.reports.plots.intervals import Interval, interval_rows
 from dropspin.reports.stories.log_findings import corrections
 from dropspin.reports.stories.numbers import formatted, grouped, left_out
-from dropspin.reports.stories.study import Study, with_all_columns
+from dropspin.reports.stories.study import Records, Study, with_all_columns
 
 UNITS = {"1": (100.0, " [%]"), "rad": (180.0 / math.pi, " [°]"), "s": (1.0, " [s]")}
 """By unit of a value, the factor that converts it to the unit that is shown, and this unit."""
@@ -39,7 +39,7 @@ class ComparedLog(Study):
     findings: list[Finding]
     comparison: LogComparison
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> Records:
         """A row for each error, difference, group, part and engine left out."""
         study = self.comparison
         rows = [{"row": part, **asdict(row)} for part in ("errors", "pairs", "parts") for row in getattr(study, part)]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any, Literal
+from typing import Literal
 
 from dropspin.comparisons.logs.fit import EQUAL, Estimate, LogFit, Transfer
 from dropspin.comparisons.logs.log import Finding
@@ -10,7 +10,7 @@ from dropspin.reports.document import Charts, Document, Sentences, Table
 from dropspin.reports.plots.intervals import Interval, interval_rows
 from dropspin.reports.stories.log_findings import corrections
 from dropspin.reports.stories.numbers import formatted, grouped, left_out
-from dropspin.reports.stories.study import Study, with_all_columns
+from dropspin.reports.stories.study import Records, Study, with_all_columns
 
 TRANSFERS: Mapping[str, Mapping[str, str]] = {
     "restitution": {
@@ -38,7 +38,7 @@ class FittedLog(Study):
     findings: list[Finding]
     fit: LogFit
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> Records:
         """A row for each estimate, for each difference between two engines, and for each engine left out."""
         fit, estimates = self.fit, [*self.fit.estimates, *([self.fit.friction] if self.fit.friction else [])]
         rows = [{"row": "estimates", **asdict(row), "discrepancy": fit.discrepancies.get(row.engine)} for row in estimates]

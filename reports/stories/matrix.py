@@ -1,8 +1,8 @@
 """The matrix of a run, a row for each scene and a column for each engine: the scenes, the errors, the marks, and the time of the steps."""
 
 import math
-from collections.abc import Hashable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.conclusion import WITHIN
 from dropspin.comparisons.results.results import MODEL_ERROR, UNDECIDED, Results, Status, is_undecided
-from dropspin.reports.stories.numbers import bound, capitalized, in_ms, quantity, short, sized, with_unit
+from dropspin.reports.stories.numbers import Row, bound, capitalized, in_ms, quantity, short, sized, with_unit
 
 MOST_SCENES = 18
 """Largest number of rows on a terminal. Of more scenes, those in which no engine has a finding are left out first, then those with the
@@ -138,7 +138,7 @@ def _explanation(results: Results, errors: pd.DataFrame, engine: str, status: St
     return capitalized("; ".join(sentences))
 
 
-def _with_bound(metric: str, row: Mapping[Hashable, Any]) -> str:
+def _with_bound(metric: str, row: Row) -> str:
     percent = row["unit"] == "1"
     allowed = bound(*(row[end] * (100.0 if percent else 1.0) for end in ("lower", "upper")))
     limits = f"bound {with_unit(allowed, '%' if percent else row['unit'])}" if allowed else "no bound at this time step"

@@ -1,9 +1,9 @@
 """The format of numbers, bounds and verdicts in all output."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from dropspin.comparisons.judging.error_budget import is_determined
 from dropspin.comparisons.judging.verdicts import COMBINED, OUTCOMES, with_reason
@@ -14,6 +14,8 @@ MOST_NAMED = 3
 """Largest number of scenes, metrics or engines that a sentence names; if there are more, it gives their number."""
 SEVERAL = 1.02
 """Sum of shares above which the shares belong to alternative explanations."""
+Row = Mapping[Hashable, Any]
+"""A row of the table of a run, by column."""
 Item = TypeVar("Item")
 Key = TypeVar("Key")
 

@@ -5,13 +5,13 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import groupby
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.published.results import Result, Status
 from dropspin.comparisons.published.sources import Source
 from dropspin.reports.document import Document, Heading, Paragraph, Part, Rows, Sentences, Table
-from dropspin.reports.stories.study import Study
+from dropspin.reports.stories.study import Records, Study
 from dropspin.scenarios.text import counted
 
 STATUSES: tuple[Status, ...] = get_args(Status)
@@ -30,7 +30,7 @@ class Reproduction(Study):
     sources: list[Source]
     results: list[Result]
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> Records:
         """A row for each result."""
         return list(map(asdict, self.results))
 

@@ -9,6 +9,9 @@ from pydantic import BaseModel, ConfigDict
 
 from dropspin.reports.document import Document
 
+Records = list[dict[str, Any]]
+"""The rows of a table of results."""
+
 
 class Study(BaseModel):
     """The results of a study. Numbers may be infinite or NaN.
@@ -22,7 +25,7 @@ class Study(BaseModel):
     study: str
 
     @abstractmethod
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> Records:
         """The rows of the CSV and JSON tables; undefined numbers are NaN or None."""
 
     @abstractmethod
@@ -30,7 +33,7 @@ class Study(BaseModel):
         """The document that becomes the page, a section of a report, or the output on a terminal."""
 
 
-def with_all_columns(rows: Sequence[Mapping[str, Any]], left_out: Mapping[str, str] = MappingProxyType({})) -> list[dict[str, Any]]:
+def with_all_columns(rows: Sequence[Mapping[str, Any]], left_out: Mapping[str, str] = MappingProxyType({})) -> Records:
     """Rows of several kinds, each with the columns of all kinds, and a row with the reason for each engine that is left out."""
     every = [*rows, *({"row": "left out", "engine": engine, "reason": why} for engine, why in left_out.items())]
     columns = dict.fromkeys(name for row in every for name in row)

@@ -9,11 +9,12 @@ from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.sweeps.folder import read_sweep_parts
 from dropspin.reports.document import Document, Table
 from dropspin.reports.stories.numbers import formatted, word
+from dropspin.reports.stories.study import Records
 
 WORST_OF = {metric: f"worst_{metric}" for metric in ("energy_drift", "energy_gain", "penetration")}
 
 
-def rows(where: str) -> list[dict[str, Any]]:
+def rows(where: str) -> Records:
     """A row for each engine: its jobs, their verdicts, the largest values of `WORST_OF` (None if undefined), and the time of all steps [s].
 
     The table is read part by part, because it may be larger than memory.

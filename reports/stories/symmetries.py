@@ -3,14 +3,14 @@
 import math
 from collections.abc import Sequence
 from operator import attrgetter, itemgetter
-from typing import Any, Literal
+from typing import Literal
 
 from dropspin.comparisons.measuring.symmetries import NAMES
 from dropspin.comparisons.symmetries.findings import STATUSES, Finding, Status
 from dropspin.reports.document import Document, Paragraph, Sentences, Table
 from dropspin.reports.stories.matrix import level
 from dropspin.reports.stories.numbers import grouped
-from dropspin.reports.stories.study import Study
+from dropspin.reports.stories.study import Records, Study
 from dropspin.scenarios.text import counted
 
 COLUMNS = ("scene", "engine", "symmetry", "status", "difference", "step", "time", "reason")
@@ -30,7 +30,7 @@ class Symmetries(Study):
     study: Literal["symmetries"] = "symmetries"
     findings: list[Finding]
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> Records:
         """A row for each finding, with all digits."""
         return [{name: getattr(finding, name) for name in COLUMNS} for finding in self.findings]
 

@@ -12,7 +12,7 @@ from dropspin.comparisons.tradeoff.points import LEVEL, CostPoint, TradeOff, spr
 from dropspin.reports.document import Charts, Document, Heading, Part, Rows, Sentences, Table
 from dropspin.reports.plots.figures import tradeoff_charts
 from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, left_out
-from dropspin.reports.stories.study import Study
+from dropspin.reports.stories.study import Records, Study
 from dropspin.scenarios.text import counted, rounded
 
 BUSY = 0.5
@@ -26,7 +26,7 @@ class TradeOffs(Study):
     scenes: list[TradeOff]
     within: list[float]
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> Records:
         """A row for each engine and time step tried."""
         return [row for study in self.scenes for row in rows(study)]
 
@@ -44,7 +44,7 @@ def _per_world(worlds: int) -> str:
     return f"per world (batch of {worlds})"
 
 
-def rows(study: TradeOff) -> list[dict[str, Any]]:
+def rows(study: TradeOff) -> Records:
     """A row for every engine and time step tried, and a row without a time step for each engine that was not run.
 
     A row has the error; the median, minimum, quartiles and spread, over the rounds, of the wall time per simulated second [s]; and the

@@ -82,8 +82,9 @@ def label_ends(axes: "Axes") -> bool:
     assert figure is not None
     figure.draw_without_rendering()  # the layout decides where lines end
     em = figure.dpi / 72.0 * float(axes.xaxis.label.get_fontsize())
-    ends = [(_end(line, axes), label, line) for line, label in zip(*axes.get_legend_handles_labels(), strict=True)]
-    ends.sort(key=itemgetter(0))
+    ends: list[tuple[float, str, Any]] = sorted(
+        ((_end(line, axes), label, line) for line, label in zip(*axes.get_legend_handles_labels(), strict=True)), key=itemgetter(0)
+    )
     heights, least = np.array([y for y, _, _ in ends]), LINE_HEIGHT * em * np.arange(len(ends))
     if not ends or not np.isfinite(heights).all():
         return False

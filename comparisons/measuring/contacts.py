@@ -67,7 +67,7 @@ class ContactResiduals(NamedTuple):
     def of_motion(self, number: int) -> "ContactResiduals":
         """The residuals of one of several motions."""
         first, last = np.searchsorted(self.motion, (number, number + 1))
-        return ContactResiduals(*(values[first:last] for values in self))
+        return ContactResiduals._make(values[first:last] for values in self)
 
 
 def contact_residuals(scene: Scenario, states: Array, motions: Motions) -> ContactResiduals:
@@ -82,7 +82,7 @@ def contact_residuals(scene: Scenario, states: Array, motions: Motions) -> Conta
     motion, steps = np.nonzero(np.atleast_2d(motions.states.touching))
     blocks = np.array_split(np.arange(len(steps)), 1 + len(steps) // AT_ONCE)
     parts = [_residuals(scene, states, motions, motion[block], steps[block]) for block in blocks]
-    return ContactResiduals(*map(np.concatenate, zip(*parts, strict=True)))
+    return ContactResiduals._make(map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _residuals(scene: Scenario, states: Array, motions: Motions, motion: NDArray[np.intp], steps: NDArray[np.intp]) -> ContactResiduals:

@@ -33,6 +33,7 @@ from dropspin.comparisons.results.table import Case, Measurement
 from dropspin.comparisons.running.ablation import explaining, written_out
 from dropspin.comparisons.running.engine_run import EngineRun, motions_from, run_engine
 from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.forecast import perturbed_sets
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress
@@ -102,9 +103,10 @@ class EngineStudy:
         scene, dt, run = self.own.scene, progress.dt, EngineRun(entry.label)
         if not timing.ended:
             starts = [phase.scene for phase in phases]
+            later = len(starts) * perturbed_sets(self.own, entry, len(starts)) if perturbs else 0
 
             def on_simulations(done: int, total: int) -> None:
-                self.on_progress(progress._replace(done=done, total=total))
+                self.on_progress(progress._replace(done=done, total=total and total + later))
 
             answer = self.processes.call(entry, run_engine, scene, dt, starts, self.own.quick, on_simulations=on_simulations)
             run = EngineRun(entry.label, answer) if isinstance(answer, Breakdown) else answer

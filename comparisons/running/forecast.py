@@ -74,11 +74,15 @@ def forecast(
 def simulations(own: StartPhase, entry: EngineEntry, dt: float) -> int:
     """The number of simulations of a scene with an engine at a time step [s]: own start, start phases, perturbed starts, ensemble."""
     scene, phases = own.scene, number_of_phases(own, dt)
-    sets = len(SIGNS) if phases == 1 else SETS_OF_STARTS if scene.floor is not None and not scene.starts_above_floor else 0
-    if own.quick and entry.adapter.precision is np.float64:
-        sets = 0
     if scene.recording is not None:
         tosses = phases // PHASES_OF_TOSS
         return 1 + phases + tosses * simulations_of(tosses)
     members = 0 if scene.ensemble is None else min(scene.ensemble.size, QUICK_MEMBERS) if own.quick else scene.ensemble.size
-    return 1 + (phases if phases > 1 else 0) + sets * phases + members
+    return 1 + (phases if phases > 1 else 0) + perturbed_sets(own, entry, phases) * phases + members
+
+
+def perturbed_sets(own: StartPhase, entry: EngineEntry, phases: int) -> int:
+    """The number of sets of perturbed starts of a scene with a number of start phases."""
+    if own.quick and entry.adapter.precision is np.float64:
+        return 0
+    return len(SIGNS) if phases == 1 else SETS_OF_STARTS if own.scene.floor is not None and not own.scene.starts_above_floor else 0

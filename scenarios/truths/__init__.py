@@ -113,9 +113,9 @@ def other_laws(scene: Scenario) -> dict[Law, Truth]:
         The solutions, by law. Empty if no impact has a coefficient of friction, if the scene has walls, or if the laws agree.
     """
     truth = truth_for(scene)
-    if truth is None or not truth.events or scene.wall is not None or law_of(scene) not in FRICTION_LAWS:
+    if truth is None or not truth.events or scene.wall is not None or (own := law_of(scene)) not in FRICTION_LAWS:
         return {}
-    truths = {law: truth_for(scene, law) for law in FRICTION_LAWS if law != law_of(scene)}
+    truths = {law: truth_for(scene, law) for law in FRICTION_LAWS if law != own}
     return {law: other for law, other in truths.items() if other is not None and _has_other_impulses(truth, other)}
 
 

@@ -91,7 +91,7 @@ def free_rotor(inertia: Array, orientation: Array, angular_velocity: Array) -> F
 
     if _is_steady(moments, axes, orientation, unit_spin):
         return FreeRotor(principal_spin(orientation, angular_velocity), float(np.linalg.norm(angular_velocity)), True, until)
-    top = AsymmetricTop(inertia, orientation, unit_spin)
+    top = AsymmetricTop(moments, axes, orientation, unit_spin)
 
     def motion(t: Array) -> tuple[Array, Array]:
         turned, rates = top(t * fastest)
@@ -128,10 +128,9 @@ def principal_spin(orientation: Array, angular_velocity: Array) -> Rotor:
 class AsymmetricTop:
     """The general free rotor; its period [s] is that of the angular velocity in the body."""
 
-    def __init__(self, inertia: Array, orientation: Array, angular_velocity: Array) -> None:
+    def __init__(self, moments: Array, axes: Array, orientation: Array, angular_velocity: Array) -> None:
         from scipy.spatial.transform import Rotation
 
-        moments, axes = principal_axes(inertia)
         spin = _along(axes, orientation, angular_velocity)
         order = _circled_axis_last(moments, spin)
         self._axes = axes @ order.T  # columns: a, b, c in the body frame
@@ -165,14 +164,14 @@ class AsymmetricTop:
 
         if len(t) > AT_ONCE:
             parts = map(self, np.array_split(t, -(-len(t) // AT_ONCE)))
-            orientations, spins = zip(*parts, strict=True)
-            return np.concatenate(orientations), np.concatenate(spins)
+            turned, rates = zip(*parts, strict=True)
+            return np.concatenate(turned), np.concatenate(rates)
         at = self._elliptic(t)
         triads, spins = self._body_frame(at)
         angle = self._precession(t, at)
         cos, sin, zeros, ones = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
-        turned = np.array([[cos, -sin, zeros], [sin, cos, zeros], [zeros, zeros, ones]]).transpose(2, 0, 1)
-        matrices = self._to_space @ turned @ triads.transpose(0, 2, 1)  # from a, b, c to space
+        about_l = np.array([[cos, -sin, zeros], [sin, cos, zeros], [zeros, zeros, ones]]).transpose(2, 0, 1)
+        matrices = self._to_space @ about_l @ triads.transpose(0, 2, 1)  # from a, b, c to space
         orientation = Rotation.from_matrix(matrices @ self._axes.T).as_quat()
         return orientation, np.einsum("nij,nj->ni", matrices, spins)
 

@@ -190,7 +190,7 @@ def test_a_terminal_without_utf_8_in_a_process_of_its_own(tmp_path):
 def test_an_interrupted_run_leaves_nothing(how, tmp_path):
     """Ctrl-C, or SIGTERM from a CI server: exit code 130, no folder, no traceback."""
     (tmp_path / "long.toml").write_text('duration = 10.0\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n')
-    process = Started("run", "long.toml", "-e", "mujoco", "--dt", "0.01", "--dt", "0.00001", cwd=tmp_path)
+    process = Started("run", "long.toml", "-e", "mujoco", "--dt", "0.01", "--dt", "0.00003", cwd=tmp_path)
     assert process.stderr.readline() == "timing the steps of each engine\n"
     code, errors = process.end(how)
     assert code == 130

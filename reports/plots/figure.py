@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import isotonic_regression
 
 from dropspin.comparisons.results.folder import written_whole
 from dropspin.reports.plots.chart import Chart, draw
@@ -78,6 +77,8 @@ def label_ends(axes: "Axes") -> bool:
     Returns:
         Whether the labels fit.
     """
+    from scipy.optimize import isotonic_regression  # slow to import, and every command imports this file
+
     figure = axes.get_figure(root=True)
     assert figure is not None
     figure.draw_without_rendering()  # the layout decides where lines end

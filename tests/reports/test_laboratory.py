@@ -66,7 +66,7 @@ def test_energy_is_accounted_for():
     assert (flight, floor, wall, gain) == pytest.approx((-4.332, -4.712, -9.563, 0.021), rel=0.03)
 
 
-@pytest.mark.parametrize("name", ["wang", "mujoco", "pybullet"])
+@pytest.mark.parametrize("name", [pytest.param("wang", marks=pytest.mark.extended), "mujoco", "pybullet"])
 def test_every_engine_runs_the_laboratory(name):
     """With its damping and its wall, from which the body comes back."""
     states = ds.simulate(laboratory.scene_of(8), name, laboratory.DT).states

@@ -53,6 +53,7 @@ def test_errors_in_flight_are_the_predicted_ones(rows_of):
     assert note["angular_momentum_direction_error"] == pytest.approx(0.7532, abs=1e-4)  # a model error, predicted like any other
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("dt", [2e-3, 1e-3])
 def test_errors_of_flat_bounces_are_the_predicted_ones(rows_of, flat, dt):
     """To what n phases leave of the speed at detection, g dt/(2n), and of the depth there, (1 - e²) u dt/(2n); and to the next order."""

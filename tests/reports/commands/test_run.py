@@ -144,8 +144,6 @@ INTERRUPTED = (
     "drop-ball",
     "-e",
     "mujoco",
-    "-e",
-    "pybullet",
     "--dt",
     "0.008",
     "--dt",

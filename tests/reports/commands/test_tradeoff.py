@@ -21,6 +21,7 @@ angular_velocity = [1.0, 5.0, 0.5]
 """
 
 
+@pytest.mark.usefixtures("two_rounds")
 def test_pareto_front_recommendations_and_files(tmp_path):
     (tmp_path / "short.toml").write_text(SCENE)
     asked = ("tradeoff", "short.toml", "-e", "wang[rotation=rk4]", "-e", "wang[rotation=exact]", "-e", "wang")

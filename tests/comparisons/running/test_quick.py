@@ -70,6 +70,7 @@ def stored(tmp_path_factory):
     return results, folder
 
 
+@pytest.mark.extended
 def test_stored_quick_run_says_what_was_left_out(stored):
     _, folder = stored
     loaded = ds.load_results(folder)

@@ -29,6 +29,7 @@ def test_compare_says_what_got_worse_and_why(repository, tmp_path):
     assert same.stdout.splitlines()[-1].startswith("None of ")
 
 
+@pytest.mark.extended
 def test_history_finds_the_run_in_which_results_moved(repository, tmp_path):
     """The run, what the move is attributed to, a table and a plot for each scene."""
     done = dropspin("compare", "history", "out", "-o", tmp_path / "history", cwd=repository)

@@ -185,8 +185,9 @@ def test_a_terminal_without_utf_8_in_a_process_of_its_own(tmp_path):
     assert "?" in done.stdout
 
 
+@pytest.mark.sample(1)
 @pytest.mark.usefixtures("engine_processes")
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
 def test_an_interrupted_run_leaves_nothing(how, tmp_path):
     """Ctrl-C, or SIGTERM from a CI server: exit code 130, no folder, no traceback."""
     (tmp_path / "long.toml").write_text('duration = 10.0\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n')

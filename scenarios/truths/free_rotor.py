@@ -154,8 +154,9 @@ class AsymmetricTop:
         self.largest_spin = math.sqrt(max(self._a**2 + self._c**2, self._b**2 + self._m1 * self._c**2))
         self.period = 4.0 * quarter_period(self._m1) / self._rate
 
-        self._set_precession()
-        start, _ = self._body_frame(self._elliptic(np.zeros(1)))
+        at_start = self._elliptic(np.zeros(1))
+        self._set_precession(at_start)
+        start, _ = self._body_frame(at_start)
         self._to_space = Rotation.from_quat(orientation).as_matrix() @ self._axes @ start[0]
 
     def __call__(self, t: Array) -> tuple[Array, Array]:
@@ -187,7 +188,7 @@ class AsymmetricTop:
         u = self._rate * t + self._u0
         return u, jacobi(u, self._m1)
 
-    def _set_precession(self) -> None:
+    def _set_precession(self, at_start: tuple[Array, Jacobi]) -> None:
         """Choose as p the body axis that stays farthest from L, so that the triad is always well defined."""
         Ia, Ib, Ic = self._moments
         m_a, m_b, m_c = Ia * self._a, Ib * self._b, Ic * self._c
@@ -197,7 +198,7 @@ class AsymmetricTop:
         self._steady = self._length / Io
         self._n = -m_p2 / m_o**2
         self._swing = self._length * m_b**2 * (Io - Ib) / (Io * Ib * m_o**2 * self._rate)
-        self._swung_at_start = integral_of_sn2(*self._elliptic(np.zeros(1)), self._n, self._m1)
+        self._swung_at_start = integral_of_sn2(*at_start, self._n, self._m1)
 
     def _precession(self, t: Array, at: tuple[Array, Jacobi]) -> Array:
         """φ(t) = L t/I_o + swing (G(u) - G(u₀)), G the integral of sn²/(1 - n sn²); o is the one of a and c that is not p."""

@@ -127,7 +127,7 @@ def measure(
         try:
             average = metric.average(cases)
         except Unresolved as error:
-            average, unresolved = Average(*[np.array([np.nan])] * 3), error
+            average, unresolved = Average(*[np.array([np.nan])] * 3), error.with_traceback(None)  # which would keep the motions
         if not np.isnan(average.value):
             components = metric.average_components(cases)
         if quick and len(cases) > 1:

@@ -149,6 +149,7 @@ class EngineProcesses:
             return Breakdown(verdict, reason)
         except Exception as error:  # what the adapter returns cannot be sent to this process
             return Breakdown("crashed", f"its result cannot be returned: {described(error)}")
+        vars(task)["_result"] = None  # pebble keeps the last task of each process, and with it many motions
         return result
 
     def _ready(self, entry: EngineEntry) -> ProcessPool:

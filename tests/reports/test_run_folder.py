@@ -430,6 +430,7 @@ def test_table_of_many_engines_cuts_no_number(capsys):
 
 
 @pytest.mark.extended
+@pytest.mark.usefixtures("all_start_phases")
 def test_setting_errors_are_compared_with_the_calibrated_profile():
     """Beside its calibrated profile a default one gets the share of each error that is due to settings: in page, table and sentence."""
     found = run("drop-ball", ["pybullet", "pybullet[profile=default]"], [4e-3, 2e-3])

@@ -9,6 +9,7 @@ from dropspin.comparisons.engines.registry import engine
 
 
 @pytest.mark.sample(2)
+@pytest.mark.usefixtures("all_start_phases")
 @pytest.mark.parametrize(
     ("name", "explained", "metric"),
     [

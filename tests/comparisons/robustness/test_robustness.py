@@ -412,6 +412,7 @@ def test_finds_the_faults_of_wang_method():
 
 
 @pytest.mark.extended
+@pytest.mark.usefixtures("all_start_phases")
 def test_finds_that_thin_bodies_pass_the_floor():
     """A box of 0.3 m that falls at 4.4 m/s passes it in steps of 68 ms or more, as they fall; at rest, by the length of its last step."""
     assert first(along("drop-box-flat", "step", "mujoco"), "tunnels")[1] == pytest.approx(0.3 / 4.427, rel=0.1)

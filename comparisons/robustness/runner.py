@@ -20,10 +20,10 @@ from dropspin.comparisons.robustness.failure_modes import (
     worst,
 )
 from dropspin.comparisons.robustness.operating_point import OperatingPoint, in_nominal_units
-from dropspin.comparisons.running.inputs import EngineEntry, ignore
+from dropspin.comparisons.running.inputs import MOST_ROWS, EngineEntry, ignore
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown, record, verify_accepted
-from dropspin.comparisons.running.start_phases import MOST_ROWS, start_phases
+from dropspin.comparisons.running.start_phases import start_phases
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 from dropspin.scenarios.state import RATES
 

@@ -34,11 +34,11 @@ from dropspin.comparisons.running.ablation import explaining, written_out
 from dropspin.comparisons.running.engine_run import EngineRun, motions_from, run_engine
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.forecast import perturbed_sets
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.inputs import MOST_ROWS, EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress
 from dropspin.comparisons.running.recording import Breakdown, divergence
-from dropspin.comparisons.running.start_phases import MOST_ROWS, StartPhase, compare, measure, phases_at
+from dropspin.comparisons.running.start_phases import StartPhase, compare, measure, phases_at
 from dropspin.comparisons.running.timing import Timing
 
 FEWEST_STEPS = 8

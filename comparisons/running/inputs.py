@@ -17,8 +17,10 @@ SceneLike = Scenario | str | Path | Mapping[str, Any]
 FEWEST_STEPS = 4
 MOST_STEPS = 2_000_000
 """Steps of a motion."""
-MOST_STATES = 2_000_000
-"""States of the motions that a run compares: one of each engine, and three more; with what is computed of them they stay below 1 GiB."""
+MOST_ROWS, MOST_STATES = 400_000, 2_000_000
+"""Steps of a run from one start, and from all start phases together; states of the motions that it compares, one of each engine and three
+more. With what is computed of them they take less than 1 GiB, also where half of the finest time step is added.
+"""
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,7 @@ def as_scenes(scenes: SceneLike | Iterable[SceneLike], default: Iterable[str] = 
 
 def verify_time_step(scene: Scenario, dt: float, engines: int = 0) -> None:
     """Raise `DropspinError` unless a scene is a sensible number of steps of dt [s], also for a run that compares `engines`."""
-    most = MOST_STATES // (engines + 3) if engines else MOST_STEPS
+    most = min(MOST_ROWS, MOST_STATES // (engines + 3)) if engines else MOST_STEPS
     so_that = f", because the motions of {engines} engine{'s' * (engines > 1)} are in memory together," if engines else ""
     if isinstance(dt, bool) or not isinstance(dt, int | float | np.floating):
         raise DropspinError(f"dt: got {described_value(dt)}; a time step is a number of seconds.")

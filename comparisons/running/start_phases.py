@@ -18,14 +18,13 @@ from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.measuring.states import States
 from dropspin.comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
 from dropspin.comparisons.running.engine_run import EngineRun
+from dropspin.comparisons.running.inputs import MOST_ROWS
 from dropspin.scenarios import Scenario, Trajectory, Truth
 from dropspin.scenarios.truths.flight import flight_states
 from dropspin.scenarios.truths.measured import tosses
 
 START_PHASES, QUICK_START_PHASES = 32, 8
 QUICK_TOSSES = 8
-MOST_ROWS = 400_000
-"""Steps from all start phases together, unless a single start takes more: their motions and what is computed of them take a gigabyte."""
 REST_SHARE = 0.1
 """A scene whose impacts are over in this share of its duration is about rest, not about impacts."""
 QUICK_NOISE = 2.0

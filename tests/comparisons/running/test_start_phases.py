@@ -6,7 +6,8 @@ import pytest
 import dropspin as ds
 from dropspin.comparisons.measuring.batch import AT_ONCE, compute_states
 from dropspin.comparisons.measuring.states import States
-from dropspin.comparisons.running.start_phases import MOST_ROWS, START_PHASES, StartPhase, number_of_phases, phases_at
+from dropspin.comparisons.running.inputs import MOST_ROWS
+from dropspin.comparisons.running.start_phases import START_PHASES, StartPhase, number_of_phases, phases_at
 
 DT = 4e-3
 SCENES = ("drop-box-flat", "spin-asymmetric", "roll-prism", "slide-box")

@@ -1,0 +1,55 @@
+"""Motions are released as soon as they are measured, so that the main process of any run stays below 1 GiB."""
+
+import os
+import subprocess
+import weakref
+
+import pytest
+from support.cli import DROPSPIN
+
+import dropspin as ds
+from dropspin.comparisons.running.engine_run import EngineRun, motions_from
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.inputs import MOST_ROWS
+from dropspin.comparisons.running.processes import FIVE_MINUTES, EngineProcesses
+from dropspin.comparisons.running.start_phases import StartPhase, compare, measure
+
+BALL = ds.load("drop-ball")
+BOUNCING = """
+duration = {duration}
+body = {{shape = "sphere", radius = 0.1, mass = 1.0}}
+floor = {{restitution = 1.0, friction = "none"}}
+gravity = {{acceleration = [0.0, -9.8, 0.0]}}
+start = {{position = [0.0, 1.1, 0.0]}}
+"""
+
+
+def test_reason_why_a_metric_is_unresolved_keeps_no_motion():
+    """Its traceback would, with the frames in which the motion was measured."""
+    own, dt = StartPhase(BALL, ds.truth_for(BALL)), 0.2
+    motion = ds.simulate(BALL, "wang", dt)
+    cases = compare([motion], [own])
+    points = measure(own, dt, EngineRun("wang", motion=motion), cases, [])
+    assert any(point.unresolved is not None for point in points.values())
+    case = weakref.ref(cases[0])
+    del cases
+    assert case() is None
+
+
+@pytest.mark.usefixtures("engine_processes")
+def test_pool_of_processes_keeps_no_motion_that_it_returned():
+    with EngineProcesses(FIVE_MINUTES) as processes:
+        motion = weakref.ref(*processes.call(engine_entry("wang"), motions_from, [BALL], 0.01))
+        assert motion() is None
+
+
+@pytest.mark.slow
+def test_longest_run_stays_below_a_gibibyte(tmp_path):
+    """A ball that bounces until the end, with as many steps as a run may have; the engine's process is smaller than the main one."""
+    (tmp_path / "long.toml").write_text(BOUNCING.format(duration=1e-3 * MOST_ROWS))
+    arguments = (DROPSPIN, "run", "long.toml", "-e", "wang", "--dt", "0.004", "--dt", "0.002", "--dt", "0.001")
+    process = subprocess.Popen(arguments, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    assert process.returncode == 0
+    assert usage.ru_maxrss < 2**20  # KiB

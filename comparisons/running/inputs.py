@@ -11,6 +11,7 @@ from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.engines.registry import engine_names
 from dropspin.scenarios import DropspinError, Scenario, SceneError, load
+from dropspin.scenarios.text import counted
 
 SceneLike = Scenario | str | Path | Mapping[str, Any]
 """A scene, its catalogue name, the path of its file, or a mapping with the same keys as a file."""
@@ -109,7 +110,7 @@ def as_scenes(scenes: SceneLike | Iterable[SceneLike], default: Iterable[str] = 
 def verify_time_step(scene: Scenario, dt: float, engines: int = 0) -> None:
     """Raise `DropspinError` unless a scene is a sensible number of steps of dt [s], also for a run that compares `engines`."""
     most = min(MOST_ROWS, MOST_STATES // (engines + 3)) if engines else MOST_STEPS
-    so_that = f", because the motions of {engines} engine{'s' * (engines > 1)} are in memory together," if engines else ""
+    so_that = f" in a run of {counted(engines, 'engine')}, whose motions are in memory together," if engines else ""
     if isinstance(dt, bool) or not isinstance(dt, int | float | np.floating):
         raise DropspinError(f"dt: got {described_value(dt)}; a time step is a number of seconds.")
     if not (np.isfinite(dt) and dt > 0.0 and FEWEST_STEPS <= scene.duration / dt + 1e-9 < most + 1):

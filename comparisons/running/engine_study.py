@@ -7,10 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import chain
 from typing import NamedTuple
-
-import numpy as np
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.judging.convergence import (
@@ -26,15 +23,15 @@ from dropspin.comparisons.judging.judge import judge, judge_asymptotic_error, ju
 from dropspin.comparisons.judging.verdicts import FAILURES, Judgement
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metric import Metric
-from dropspin.comparisons.measuring.metrics import METRICS, leading_metric, metrics_for
-from dropspin.comparisons.measuring.tolerances import perturbed, scale
+from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
+from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.provenance import motion_digest
 from dropspin.comparisons.results.table import Case, Measurement
 from dropspin.comparisons.running.ablation import explaining, written_out
-from dropspin.comparisons.running.engine_run import EngineRun, motions_from, run_engine
+from dropspin.comparisons.running.engine_run import EngineRun, run_engine
 from dropspin.comparisons.running.entries import engine_entry
-from dropspin.comparisons.running.forecast import perturbed_sets
-from dropspin.comparisons.running.inputs import MOST_ROWS, EngineEntry
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.perturbed_starts import metrics_from_each_set, number_of_sets
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress
 from dropspin.comparisons.running.recording import Breakdown, divergence
@@ -100,54 +97,33 @@ class EngineStudy:
         self, entry: EngineEntry, phases: Sequence[StartPhase], progress: Progress, timing: Timing, *, perturbs: bool = True
     ) -> tuple[Outcome, list[Comparison]]:
         """Simulate the scene from all start phases, and measure every metric; from perturbed starts too, if the uncertainty matters."""
-        scene, dt, run = self.own.scene, progress.dt, EngineRun(entry.label)
+        scene, dt, run, size = self.own.scene, progress.dt, EngineRun(entry.label), len(phases)
         if not timing.ended:
             starts = [phase.scene for phase in phases]
-            later = len(starts) * perturbed_sets(self.own, entry, len(starts)) if perturbs else 0
+            perturbed = size * number_of_sets(self.own, entry.adapter.precision, size) if perturbs else 0
 
             def on_simulations(done: int, total: int) -> None:
-                self.on_progress(progress._replace(done=done, total=total and total + later))
+                self.on_progress(progress._replace(done=done, total=total and total + perturbed))
 
             answer = self.processes.call(entry, run_engine, scene, dt, starts, self.own.quick, on_simulations=on_simulations)
             run = EngineRun(entry.label, answer) if isinstance(answer, Breakdown) else answer
         motions = [] if run.motion is None else [run.motion, *run.phases]
         run.breakdown = run.breakdown or timing.breakdown or next(filter(None, map(divergence, motions)), None)
         cases, around = [] if run.breakdown else compare(run.phases, phases), []
-        if cases and perturbs and not (self.own.quick and run.precision is np.float64):
+        if cases and perturbs:
+            before = size + (size > 1)
+
+            def on_perturbed(done: int) -> None:
+                self.on_progress(progress._replace(done=before + done, total=before + perturbed))
+
             try:
-                around = self._around(entry, phases, progress, run.precision)
+                around = metrics_from_each_set(self.own, entry, phases, dt, run.precision, self.processes, on_perturbed)
             except Breakdown as breakdown:
                 run.breakdown, cases = breakdown, []
         points = measure(self.own, dt, run, cases, around) if cases else {}
         digest = motion_digest(motions) if motions else ""
         case = Case(scene.name, entry.label, dt, scene.steps(dt))
         return Outcome(case, timing.per_step, replace(run, phases=[]), points, digest), cases
-
-    def _around(self, entry: EngineEntry, phases: Sequence[StartPhase], progress: Progress, precision: type) -> list[Mapping[str, float]]:
-        """Every metric by name from each set of perturbed starts, an estimate of what rounding may do; few motions are kept at a time.
-
-        Raises:
-            Breakdown: There are no motions from these starts.
-        """
-        scene, size = self.own.scene, len(phases)
-        sets, before = perturbed(scene, [phase.scene for phase in phases], precision), size + (size > 1)
-        at_once = max(1, MOST_ROWS // (size * scene.steps(progress.dt)))
-
-        def values(first: int) -> Iterator[Mapping[str, float]]:
-            """From some of the sets; their motions are dropped when it ends."""
-
-            def on_simulations(done: int, _: int) -> None:
-                self.on_progress(progress._replace(done=before + first * size + done, total=before + len(sets) * size))
-
-            starts = list(chain(*sets[first : first + at_once]))
-            motions = self.processes.call(entry, motions_from, starts, progress.dt, on_simulations=on_simulations)
-            if isinstance(motions, Breakdown):
-                raise motions
-            for number in range(0, len(motions), size):
-                cases = compare(motions[number : number + size], phases)
-                yield {metric.name: metric.value_or_nan(cases) for metric in metrics_for(scene, self.own.truth)}
-
-        return list(chain(*map(values, range(0, len(sets), at_once))))
 
     def rows(self, *, is_extrapolated: bool) -> Iterator[Measurement]:
         """All rows of the engine: at each time step, and its orders and asymptotic errors if there are enough time steps."""

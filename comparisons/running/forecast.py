@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS
-from dropspin.comparisons.measuring.tolerances import SETS_OF_STARTS, SIGNS
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.perturbed_starts import number_of_sets
 from dropspin.comparisons.running.start_phases import StartPhase, number_of_phases
 from dropspin.comparisons.running.timing import Timing
 from dropspin.comparisons.running.uncertainty import simulations_of
@@ -78,11 +78,4 @@ def simulations(own: StartPhase, entry: EngineEntry, dt: float) -> int:
         tosses = phases // PHASES_OF_TOSS
         return 1 + phases + tosses * simulations_of(tosses)
     members = 0 if scene.ensemble is None else min(scene.ensemble.size, QUICK_MEMBERS) if own.quick else scene.ensemble.size
-    return 1 + (phases if phases > 1 else 0) + perturbed_sets(own, entry, phases) * phases + members
-
-
-def perturbed_sets(own: StartPhase, entry: EngineEntry, phases: int) -> int:
-    """The number of sets of perturbed starts of a scene with a number of start phases."""
-    if own.quick and entry.adapter.precision is np.float64:
-        return 0
-    return len(SIGNS) if phases == 1 else SETS_OF_STARTS if own.scene.floor is not None and not own.scene.starts_above_floor else 0
+    return 1 + (phases if phases > 1 else 0) + number_of_sets(own, entry.adapter.precision, phases) * phases + members

@@ -132,7 +132,7 @@ def judged(
     findings: list[Finding] = []
     if all(map(math.isfinite, values)) and is_sufficient(dts):
         limit = error_budget(dts, errors, negligible=0.1 * NOTEWORTHY * scale).asymptotic_error if any(errors) else 0.0
-    if (not math.isfinite(free) and math.isfinite(exact[0])) or abs(exact[0] - free) > NOTEWORTHY * scale:
+    if values[0] != free and ((not math.isfinite(free) and math.isfinite(exact[0])) or abs(exact[0] - free) > NOTEWORTHY * scale):
         findings.append(Finding("setting", acting))
     if abs(errors[0]) > NOTEWORTHY * scale * (1.0 + 1e-6):
         vanishes = abs(errors[-1]) < 0.6 * abs(errors[0])

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import DECAY_TIME, KEPT, NOTEWORTHY, OF_FALLS, Answer, judged, vector_text
-from dropspin.comparisons.diagnosis.loose_body import STILL, LooseBody
+from dropspin.comparisons.diagnosis.loose_body import STILL, LooseBody, time_of_decay
 from dropspin.comparisons.diagnosis.parts import DIRECTIONS
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.scenarios.rotations import unrotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, UP, Array
-from dropspin.scenarios.truths.settings import terminal_speed, time_constant
+from dropspin.scenarios.truths.settings import terminal_speed
 
 FALL, TURN = 1.0, 1.0  # s
 SPEED = 10.0  # rad/s
@@ -47,10 +47,9 @@ def fall(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
 def spin(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The decay of a spin about each principal axis."""
     facts, answers = body.facts, []
-    moments, axes = facts.principal
-    for number, axis in enumerate(axes.T):
+    for number, axis in enumerate(facts.principal[1].T):
         direction, start = vector_text(axis), facts.start(spin=SPEED * axis)
-        tau = time_constant(SPEED, moments[number], facts.armature, *facts.spins[number])
+        tau = facts.slowed(number, SPEED)
         if tau < TURN:
             times = [_decay(body, start, dt, tau) for dt in dts]
             slowed = Answer("spin", DECAY_TIME, "s", direction, physical=math.inf)
@@ -67,14 +66,7 @@ def _decay(body: LooseBody, start: Array, dt: float, tau: float) -> float:
     """The time at which a spin is 1/e of its start [s], interpolated between steps as an exponential."""
     steps = min(math.ceil(3.0 * tau / dt) + 3, LONGEST)
     speeds = np.linalg.norm(body.motions(start[np.newaxis], dt, steps, STILL, floor=False)[0, :, SPIN], axis=1)
-    below = np.flatnonzero(speeds <= SPEED / math.e)
-    if not len(below):
-        return math.inf
-    last = int(below[0])
-    if speeds[last] <= 0.0:
-        return dt * last
-    before, after = math.log(speeds[last - 1]), math.log(speeds[last])
-    return dt * (last - 1 + (before - math.log(SPEED) + 1.0) / (before - after))
+    return time_of_decay(dt * np.arange(1.0 + steps), speeds)
 
 
 def _turned(body: LooseBody, starts: Array, dt: float) -> Array:
@@ -123,7 +115,7 @@ def _tumbles(body: LooseBody) -> bool:
     """Whether a spin of a body is not about a principal axis always, and not damped within a second."""
     facts = body.facts
     moments = facts.principal[0]
-    is_slowed = any(time_constant(SPEED, m, facts.armature, *drag) < TURN for m, drag in zip(moments, facts.spins, strict=True))
+    is_slowed = any(facts.slowed(axis, SPEED) < TURN for axis in range(3))
     return bool(np.ptp(moments) >= 1e-9 * moments.max()) and not is_slowed
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import Answer, Finding, Remedy, digits, vector_text
-from dropspin.comparisons.diagnosis.loose_body import Facts
+from dropspin.comparisons.diagnosis.loose_body import Facts, MassProperties
 from dropspin.scenarios.bodies.possible_moments import largest_multiple
 from dropspin.scenarios.state import Array
 
@@ -19,32 +19,49 @@ SMALL = 1e-3
 def inertia(facts: Facts) -> list[Answer]:
     """The moments in force beside those of a solid; what is impossible in those of the file, or of the engine if the file has none."""
     solid = facts.solid
-    remedies = () if solid is None else (Remedy(f"the inertia of a uniform solid, {_components(solid)}"),)
-    answers = list(_impossible(facts, facts.inertia if facts.written is None else facts.written, remedies))
+    answers = list(_impossible(facts, facts.written or MassProperties(facts.mass, facts.offset, facts.inertia), solid))
     for number, axis in enumerate(facts.principal[1].T):
-        of_solid = math.nan if solid is None else float(axis @ solid @ axis)
+        of_solid = math.nan if solid is None else float(axis @ solid.inertia @ axis)
         moment = float(facts.principal[0][number])
         answers.append(Answer("inertia", MOMENT, "kg m²", vector_text(axis), measured=moment, physical=of_solid))
     return answers
 
 
-def _impossible(facts: Facts, given: Array, remedies: tuple[Remedy, ...]) -> Iterator[Answer]:
-    """Why no body has an inertia [kg m²], shape (3, 3), or no body of this shape and mass."""
-    least, middle, largest = np.linalg.eigvalsh(given).tolist()
-    excess, quantity, possible = largest / (least + middle), "largest moment / sum of others", "at most 1 for any body"
+def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | None) -> Iterator[Answer]:
+    """Why no body has an inertia, or no body of this shape, mass and centre of mass."""
+    remedies = () if solid is None else (Remedy(f"the inertia of a uniform solid, {_components(solid.inertia)}"),)
+    least, middle, largest = np.linalg.eigvalsh(given.inertia).tolist()
+    quantity, possible = "largest moment / sum of others", "at most 1 for any body"
     if least <= 0.0:
-        excess, quantity, possible = least / largest, "least moment / largest", "more than 0 for any body"
-    elif largest <= ROUNDING * (least + middle):
+        excess, quantity, possible = least / largest if largest else 0.0, "least moment / largest", "more than 0 for any body"
+    elif largest > ROUNDING * (least + middle):
+        excess = largest / (least + middle)
+    else:
         if not facts.parts:
             return
-        squares = (0.5 * np.trace(given) * np.eye(3) - given) / facts.mass
-        excess = 1.0 / largest_multiple(facts.points, squares, 1.0 / ROUNDING)
+        squares = (0.5 * np.trace(given.inertia) * np.eye(3) - given.inertia) / given.mass
+        points = facts.points + facts.offset - given.centre
+        excess = _excess(points, squares)
         if excess <= ROUNDING:
             return
-        excess = factor if (factor := largest / largest_possible(facts, given)) > ROUNDING else excess
+        off = np.zeros(3) if solid is None else solid.centre - given.centre
+        if off.any() and _excess(points - off, squares) <= ROUNDING:
+            remedy = Remedy(f"the centre of mass of a uniform solid, displaced by ({digits(off.tolist())}) m along the body's axes")
+            finding = Finding("impossible", ("inertia",), (remedy,), "no body of this mass and shape has these moments about that point")
+            yield Answer(
+                "inertia", "distance of the centre of mass from a solid's", "m", measured=float(np.linalg.norm(off)), findings=(finding,)
+            )
+            return
+        excess = factor if (factor := largest / largest_possible(given, points)) > ROUNDING else excess
         quantity, possible = "largest moment / largest possible", "at most 1 for this mass and shape"
     finding = Finding("impossible", ("inertia",), remedies, possible)
     yield Answer("inertia", quantity, "1", measured=excess, physical=float(least > 0.0), findings=(finding,))
+
+
+def _excess(points: Array, squares: Array) -> float:
+    """The factor by which second moments [m²], shape (3, 3), exceed what is possible inside the hull of points; infinite if none are."""
+    multiple = largest_multiple(points, squares, 1.0 / ROUNDING)
+    return 1.0 / multiple if multiple > 0.0 else math.inf
 
 
 def _components(tensor: Array) -> str:
@@ -53,11 +70,11 @@ def _components(tensor: Array) -> str:
     products = tensor[[0, 0, 1], [1, 2, 2]]
     if np.abs(products).max() > SMALL * tensor.max():
         found += f", ixy, ixz, iyz = {digits(products)}"
-    return f"{found} kg m²"
+    return f"{found} kg m² about the body's axes"
 
 
-def largest_possible(facts: Facts, tensor: Array) -> float:
-    """The largest moment of inertia about a principal axis of a tensor if no mass is outside of the body [kg m²]."""
-    axes = np.linalg.eigh(tensor)[1].T
-    squares = np.sum(facts.points**2, axis=1)
-    return facts.mass * max(float(np.max(squares - (facts.points @ axis) ** 2)) for axis in axes)
+def largest_possible(given: MassProperties, points: Array) -> float:
+    """The largest moment of inertia about a principal axis of a tensor if no mass is outside of the hull of points [kg m²]."""
+    axes = np.linalg.eigh(given.inertia)[1].T
+    squares = np.sum(points**2, axis=1)
+    return given.mass * max(float(np.max(squares - (points @ axis) ** 2)) for axis in axes)

@@ -86,24 +86,36 @@ def _rebounds(body: LooseBody, speed: float, dt: float, phases: int) -> tuple[Ar
     return np.array(ratios), np.array(fastest), np.array(depths), np.array(times)
 
 
-def rest(body: LooseBody, _: Sequence[float]) -> list[Answer]:
-    """The depth of the body at rest, and its speed there."""
+def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
+    """The depth of the body at rest, and its speed there: findings if they differ from the exact ones by 1 % of the body's size."""
     facts = body.facts
     if not facts.lands:
         return []
-    states = body.settled
-    last = states[-math.ceil(0.5 / facts.dt) :]
-    heights = facts.lowest(last)
-    depth = -float(heights.mean())
-    size = max(float(np.linalg.norm(facts.points, axis=1).max()), 1e-12)
-    floats = facts.margin > 0.0 and -depth > NOTEWORTHY * size
-    findings = (Finding("setting", ("margin",)),) * floats
-    speed = float(np.linalg.norm(np.ptp(last[:, POSITION], axis=0))) / 0.5
-    detail = TIPS if tilt(states) > UNTURNED else ""
+    noteworthy = NOTEWORTHY * max(float(np.linalg.norm(facts.points, axis=1).max()), 1e-12)
+    depth, speed, tips = _at_rest(body, dts[0])
+    depth_error, moving = abs(depth - facts.rest_depth), 0.0 if tips else speed
+    is_wrong = depth_error > noteworthy or moving > noteworthy
+    finest_depth, finest_speed, _ = _at_rest(body, dts[-1]) if is_wrong else (depth, speed, tips)
+    floats = facts.margin > 0.0 and -depth > noteworthy
+    of_depth = (Finding("setting", ("margin",)),) * floats + _of_error(depth_error, abs(finest_depth - facts.rest_depth), noteworthy)
+    of_speed = _of_error(moving, finest_speed, noteworthy)
     return [
-        Answer("rest", "penetration", "m", measured=depth, in_force=facts.rest_depth, physical=0.0, findings=findings),
-        Answer("rest", "drift speed", "m/s", measured=speed, physical=0.0, detail=detail),
+        Answer("rest", "penetration", "m", measured=depth, in_force=facts.rest_depth, physical=0.0, findings=of_depth),
+        Answer("rest", "drift speed", "m/s", measured=speed, physical=0.0, detail=TIPS * tips, findings=of_speed),
     ]
+
+
+def _of_error(error: float, finest: float, noteworthy: float) -> tuple[Finding, ...]:
+    """The finding of an error that exceeds a limit, by what the error is at the finest time step; none if the error is not known."""
+    return (Finding("time step" if finest < 0.6 * error else "model", ("timestep",)),) * (error > noteworthy)
+
+
+def _at_rest(body: LooseBody, dt: float) -> tuple[float, float, bool]:
+    """The mean depth [m] and the speed [m/s] of a body that was put down, in the last half second, and whether it tips or rolls."""
+    states = body.settled if dt == body.facts.dt else body.put_down(dt)
+    last = states[-math.ceil(0.5 / dt) :]
+    speed = float(np.linalg.norm(np.ptp(last[:, POSITION], axis=0))) / 0.5
+    return -float(body.facts.lowest(last).mean()), speed, tilt(states) > UNTURNED
 
 
 def tilt(states: Array) -> float:

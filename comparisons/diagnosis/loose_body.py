@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import SPIN, UP, Array
-from dropspin.scenarios.truths.settings import Resistance, fall, free_motion, spin_about_axis
+from dropspin.scenarios.truths.settings import Resistance, fall, free_motion, spin_about_axis, time_constant
 
 SETTLED = 3.0  # s
 STILL = np.zeros(3)
@@ -27,10 +27,19 @@ Changes = Mapping[str, str | float]
 
 
 class Drag(NamedTuple):
-    """The coefficients of a damping force, `linear` in N s/m and `quadratic` in N s²/m², or of a torque, in N m s and N m s²."""
+    """The coefficients of v, v² and v³ in a damping force [N s/m, N s²/m², N s³/m³], or of ω, ω² and ω³ in a torque [N m s, …]."""
 
     linear: float = 0.0
     quadratic: float = 0.0
+    cubic: float = 0.0
+
+
+class MassProperties(NamedTuple):
+    """Mass [kg], centre of mass [m], shape (3,), and the inertia about it [kg m²], shape (3, 3), in the frame of the body."""
+
+    mass: float
+    centre: Array
+    inertia: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,12 +65,13 @@ class Facts:
         unknown: The names of the settings by which forces act that no exact solution here includes.
         surface: The name of what it lands on; empty for nothing.
         others: The names of what else it may land on.
-        friction: The coefficient of friction of both together.
+        friction: The coefficient of friction of both together, along x.
+        isotropic: Whether it is the same in all directions.
         restitution: The coefficient of restitution of both together; None if the engine has none.
         margin: Height above the surface from which the contact acts [m].
         rolling: Whether friction resists rolling.
         rest_depth: Depth of a body at rest below the surface by the contact settings [m], negative above; NaN if it has no closed form.
-        written: The inertia that the file has [kg m²], shape (3, 3); None if it has none.
+        written: The mass and inertia that the file has; None if it has no inertia.
         settings: Where settings that matter are written, by the engine's names.
         ignored: What the engine read and does not use, or changes: name, what is written, what is in force.
         unmodelled: What the file has beside the body that the simulations leave out.
@@ -86,11 +96,12 @@ class Facts:
     surface: str
     others: Sequence[str] = ()
     friction: float
+    isotropic: bool = True
     restitution: float | None = None
     margin: float
     rolling: bool
     rest_depth: float
-    written: Array | None
+    written: MassProperties | None
     settings: Mapping[str, Setting]
     ignored: Sequence[tuple[str, Setting, str]]
     unmodelled: Sequence[str]
@@ -129,17 +140,26 @@ class Facts:
 
     def fallen(self, time: float) -> float:
         """The exact distance fallen from rest with the settings in force [m], after a time [s]."""
-        if not self.offset.any():
-            return float(fall(time, self.gravity * (1.0 - self.lifted), self.mass, self.armature, *self.falls)[0])
+        if not self.offset.any() and not self.falls.cubic:
+            return float(fall(time, self.gravity * (1.0 - self.lifted), self.mass, self.armature, *self.falls[:2])[0])
         return float(-self.in_force(self.start(), np.array([0.0, time]), self.gravity)[-1, 1] + self.start()[1])
 
     def spun(self, axis: int, speed: float, time: float) -> float:
         """The exact speed of a spin about a principal axis with the settings in force [rad/s], after a time [s]."""
         moments, axes = self.principal
-        if not self.offset.any():
-            return float(spin_about_axis(time, speed, moments[axis], self.armature, *self.spins[axis]))
+        if not self.offset.any() and not self.spins[axis].cubic:
+            return float(spin_about_axis(time, speed, moments[axis], self.armature, *self.spins[axis][:2]))
         start = self.start(spin=speed * axes[:, axis])
         return float(np.linalg.norm(self.in_force(start, np.array([0.0, time]), 0.0)[-1, SPIN]))
+
+    def slowed(self, axis: int, speed: float) -> float:
+        """The exact time after which a spin about a principal axis is 1/e of its start [s]; infinite if the settings do not slow it."""
+        moments, axes = self.principal
+        tau = time_constant(speed, moments[axis], self.armature, *self.spins[axis])
+        if not self.offset.any() or math.isinf(tau):
+            return tau
+        times = np.linspace(0.0, 4.0 * tau, 4001)
+        return time_of_decay(times, np.linalg.norm(self.in_force(self.start(spin=speed * axes[:, axis]), times, 0.0)[:, SPIN], axis=1))
 
     @property
     def points(self) -> Array:
@@ -151,8 +171,8 @@ class Facts:
         return np.concatenate(found)
 
     @property
-    def solid(self) -> Array | None:
-        """The inertia about the centre of mass if the mass were spread evenly over the geometries [kg m²], shape (3, 3)."""
+    def solid(self) -> MassProperties | None:
+        """Those of a body of the same mass, spread evenly over the geometries."""
         parts = self.colliding
         volumes = [VOLUMES[part.shape.shape](part.shape) for part in parts]
         if not parts or not min(volumes) > 0.0:
@@ -163,7 +183,19 @@ class Facts:
             axes, arm = rotate(part.turn, AXES).T, part.position - centre
             about = axes @ part.shape.inertia_tensor @ axes.T + arm @ arm * np.eye(3) - np.outer(arm, arm)
             found += self.mass * share * about
-        return found
+        return MassProperties(self.mass, centre + self.offset, found)
+
+
+def time_of_decay(times: Array, speeds: Array) -> float:
+    """The time at which a speed is 1/e of its start [s], interpolated as an exponential; infinite if it is at none of the times."""
+    below = np.flatnonzero(speeds <= speeds[0] / math.e)
+    if not len(below):
+        return math.inf
+    last = int(below[0])
+    if speeds[last] <= 0.0:
+        return float(times[last])
+    before, after = math.log(speeds[last - 1] / speeds[0]), math.log(speeds[last] / speeds[0])
+    return float(times[last - 1] + (times[last] - times[last - 1]) * (before + 1.0) / (before - after))
 
 
 class LooseBody(ABC):
@@ -177,7 +209,7 @@ class LooseBody(ABC):
 
     facts: Facts
     remedies: Mapping[str, Changes]
-    causes: ClassVar[Mapping[str, tuple[str, ...]]]
+    causes: Mapping[str, tuple[str, ...]]
 
     @abstractmethod
     def changed(self, changes: Changes) -> "LooseBody":
@@ -194,8 +226,12 @@ class LooseBody(ABC):
 
     @cached_property
     def settled(self) -> Array:
-        """The states of the body that is put down in the file's pose, over three seconds at the file's time step, shape (n, 13)."""
-        dt, weight = self.facts.dt, -self.facts.gravity * UP
+        """`put_down` at the file's time step."""
+        return self.put_down(self.facts.dt)
+
+    def put_down(self, dt: float) -> Array:
+        """The states of the body that is put down in the file's pose, over three seconds in time steps of dt [s], shape (n, 13)."""
+        weight = -self.facts.gravity * UP
         found: Array = self.motions(self.facts.start()[np.newaxis], dt, math.ceil(SETTLED / dt), weight, floor=True)[0]
         return found
 

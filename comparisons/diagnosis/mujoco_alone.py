@@ -4,6 +4,7 @@ It has one contact pair for each geometry that may touch the surface, with the s
 is the plane y = 0.
 """
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -13,7 +14,8 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, PLANE, MuJoCoFile, plain, set_options
-from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, mesh_of, quaternion
+from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, mesh_of, quaternion, shape_of
+from dropspin.comparisons.diagnosis.parts import VOLUMES
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
 from dropspin.scenarios.state import UP, Array
@@ -104,15 +106,26 @@ class MuJoCoAlone:
                 joint.damping, joint.armature = self.damping, self.armature
                 if self.dof is not None and "frictionloss" not in self._changes:
                     joint.frictionloss = old.dof_frictionloss[self.dof]
-            if old.body_mass[body] > 0.0:
-                moments = np.array(old.body_inertia[body])
+            moments, weights = np.array(old.body_inertia[body]), dict.fromkeys(self.geoms, 0.0)
+            if old.body_mass[body] > 0.0 and not moments.any():  # which MuJoCo simulates no body with
+                weights |= self._spread(body)
+            elif old.body_mass[body] > 0.0:
                 largest = int(np.argmax(moments))
                 moments[largest] = min(moments[largest], np.nextafter(moments.sum() - moments[largest], 0.0))
                 new.explicitinertial, new.mass, new.inertia = True, old.body_mass[body], moments
                 new.ipos, new.iquat = old.body_ipos[body], old.body_iquat[body]
             for number, geom in enumerate(self.geoms):
                 if old.geom_bodyid[geom] == body:
-                    new.add_geom(mass=0.0, name=f"own {number}", contype=0, conaffinity=0, **self._geom(spec, geom))
+                    new.add_geom(mass=weights[geom], name=f"own {number}", contype=0, conaffinity=0, **self._geom(spec, geom))
+
+    def _spread(self, body: int) -> dict[int, float]:
+        """The mass of a body, spread evenly over its geometries [kg]."""
+        old = self.file.model
+        shapes = {geom: shape_of(old, geom)[0] for geom in self.geoms if old.geom_bodyid[geom] == body}
+        volumes = {geom: VOLUMES[shape.shape](shape) for geom, shape in shapes.items()}
+        if not sum(volumes.values()) > 0.0:
+            raise Breakdown("declined", "it has mass, and neither moments of inertia nor a solid geometry")
+        return {geom: float(old.body_mass[body]) * volume / sum(volumes.values()) for geom, volume in volumes.items()}
 
     @property
     def damping(self) -> Array:
@@ -156,7 +169,7 @@ class MuJoCoAlone:
         """The settings of a contact, with the time constant that MuJoCo raises to two of the file's steps."""
         changed = {name: np.array(str(self._changes[name]).split(), float) for name in ("solref", "solimp") if name in self._changes}
         still = {"margin": 0.0, "gap": 0.0} if "margin" in self._changes else {}
-        return dict(pair) | {"solref": self.clamped(pair)} | changed | still
+        return dict(pair) | {"solref": self.clamped(pair)} | ({} if self.file.overrides else changed | still)
 
     def clamped(self, pair: Mapping[str, Any]) -> Array:
         """The time constant and the damping ratio that are in force at the file's time step."""
@@ -181,6 +194,12 @@ class MuJoCoAlone:
         settings = GeomSettings(friction=friction, **{name: plain(np.asarray(touching[name])) for name in names})
         is_safe = not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE
         return SoftContact(settings, option.cone == ELLIPTIC, option.impratio, option.timestep if is_safe else 0.0)
+
+    @property
+    def gravity_angle(self) -> float:
+        """The angle between gravity and the direction into the surface [°]."""
+        x, y, z = rotate(self.level, self.file.gravity)
+        return math.degrees(math.atan2(math.hypot(x, z), -y)) if self.file.gravity.any() else 0.0
 
     @cached_property
     def level(self) -> Array:

@@ -2,15 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco import rollout
 
-from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody
+from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
-from dropspin.comparisons.diagnosis.mujoco_file import ENUMERATIONS, GEOM, OPTIONS, MuJoCoFile
+from dropspin.comparisons.diagnosis.mujoco_file import ENUMERATIONS, GEOM, OPTIONS, MuJoCoFile, lowers_margin, mass_properties
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.diagnosis.parts import Part, Support, at_point
@@ -27,6 +27,8 @@ FLAT = 1e-9
 SPRING_STEPS = 20.0
 """Time steps of an impact on a spring that gives a coefficient of restitution."""
 LEAST_OF_A_SPRING = 0.01
+LEVEL = 0.1
+"""Angle between gravity and the normal of a surface up to which the surface is level [°]."""
 NO_FLUID: Changes = {"density": 0.0, "viscosity": 0.0}
 
 REMEDIES: Mapping[str, Changes] = {
@@ -41,6 +43,9 @@ REMEDIES: Mapping[str, Changes] = {
     "density": NO_FLUID,
     "viscosity": NO_FLUID,
 }
+
+
+CAUSES = dict.fromkeys(("fall", "spin", "tumble"), ("integrator",)) | {"slide": ("cone", "impratio")}
 
 
 class MuJoCoModel(MuJoCoFile):
@@ -59,18 +64,15 @@ class MuJoCoBody(LooseBody):
         alone: Its model.
     """
 
-    causes: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "fall": ("integrator",),
-        "spin": ("integrator",),
-        "tumble": ("integrator",),
-        "slide": ("cone", "impratio"),
-    }
-
     def __init__(self, name: str, alone: MuJoCoAlone) -> None:
         self._name, self._alone, self._file, self.remedies = name, alone, alone.file, REMEDIES
+        self.causes = CAUSES
         self._text = BodyText(alone.file, alone.head, alone.surface)
         self._model = alone.model(alone.file.model.opt.timestep, np.zeros(3), floor=False)
-        self._offset, self._inertia = self._mass_properties()
+        found = mass_properties(self._model, self._at_rest, range(1, self._model.nbody))
+        assert found is not None  # bodies without mass are left out
+        self._properties: MassProperties = found
+        self._offset = found.centre
         self.facts = self._facts()
 
     def changed(self, changes: Changes) -> LooseBody:
@@ -116,17 +118,6 @@ class MuJoCoBody(LooseBody):
             raise Diverged(f"MuJoCo's state became NaN or too large within {steps} steps of {dt:g} s")
         return at_point(to_world(rows[..., 1:14]), self._offset)
 
-    def _mass_properties(self) -> tuple[Array, Array]:
-        """The centre of mass in the frame of the body [m], and the inertia about it [kg m²], of the body and what is welded to it."""
-        model, data = self._model, self._at_rest
-        masses, points = model.body_mass[1:], data.xipos[1:]
-        centre = np.average(points, axis=0, weights=masses)
-        inertia = np.zeros((3, 3))
-        for mass, moments, axes, arm in zip(masses, model.body_inertia[1:], data.ximat[1:], points - centre, strict=True):
-            turn = axes.reshape(3, 3)
-            inertia += turn @ np.diag(moments) @ turn.T + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-        return centre, inertia
-
     @cached_property
     def _at_rest(self) -> Any:
         data = mujoco.MjData(self._model)
@@ -136,9 +127,11 @@ class MuJoCoBody(LooseBody):
 
     def _facts(self) -> Facts:
         alone, file = self._alone, self._file
-        touching, surface = alone.touching, None if alone.touching is None else alone.surface
+        off = alone.gravity_angle
+        touching = alone.touching if off < 90.0 - LEVEL else None
+        surface = None if touching is None else alone.surface
         raised = any(not np.array_equal(alone.clamped(pair), pair["solref"]) for pair in alone.pairs.values())
-        drag, option = Drag(*alone.damping[:2]), self._model.opt
+        drag, option = Drag(*alone.damping), self._model.opt
         unmodelled = {"frictionloss": self._model.dof_frictionloss.any(), "density": option.density, "viscosity": option.viscosity}
         pose = multiply(alone.level, np.roll(file.data.xquat[alone.head], -1))
         return Facts(
@@ -147,8 +140,8 @@ class MuJoCoBody(LooseBody):
             version=mujoco.__version__,
             dt=file.model.opt.timestep,
             gravity=float(np.linalg.norm(file.gravity)),
-            mass=float(self._model.body_mass.sum()),
-            inertia=self._inertia,
+            mass=self._properties.mass,
+            inertia=self._properties.inertia,
             offset=self._offset,
             parts=self._parts,
             pose=pose,
@@ -160,14 +153,18 @@ class MuJoCoBody(LooseBody):
             unknown=[name for name, acts in unmodelled.items() if acts],
             surface="" if surface is None else self._names[surface],
             others=[self._names[geom] for geom in alone.others],
-            friction=0.0 if touching is None or touching["condim"] == 1 else float(touching["friction"][0]),
-            margin=0.0 if touching is None else float(touching["margin"] - touching["gap"]),
+            friction=0.0 if touching is None or touching["condim"] == 1 else float(touching["friction"][1]),
+            isotropic=touching is None or touching["friction"][0] == touching["friction"][1],
+            margin=0.0 if touching is None else float(touching["margin"] - lowers_margin() * touching["gap"]),
             rolling=touching is not None and touching["condim"] == 6 and bool(np.any(touching["friction"][3:])),
             rest_depth=self._rest_depth(pose),
             written=self._text.written,
             settings=self._text.settings,
-            ignored=list(self._text.ignored(self._inertia, raised=raised)),
-            unmodelled=file.unmodelled(alone.head),
+            ignored=list(self._text.ignored(self._properties, raised=raised)),
+            unmodelled=[
+                *file.unmodelled(alone.head),
+                *[f"a gravity {off:.3g}° from the inward normal of the surface"] * (off > LEVEL),
+            ],
         )
 
     @cached_property
@@ -193,8 +190,8 @@ class MuJoCoBody(LooseBody):
         points = 0 if contact is None or (armature and self._offset.any()) else self._points(pose)
         if not points or contact is None:
             return np.nan
-        mass = float(self._model.body_mass.sum())
-        load = float(np.linalg.norm(self._file.gravity)) * mass / (mass + armature) / points
+        mass = self._properties.mass
+        load = float(np.linalg.norm(self._file.gravity)) * (1.0 - float(self._model.body_gravcomp[1])) * mass / (mass + armature) / points
         return contact.depth(load) - contact.settings.margin
 
     def _points(self, pose: Array) -> int:

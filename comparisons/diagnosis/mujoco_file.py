@@ -3,19 +3,20 @@
 import math
 from collections.abc import Sequence
 from copy import copy
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from dropspin.comparisons.diagnosis.loose_body import Changes
+from dropspin.comparisons.diagnosis.loose_body import Changes, MassProperties
 from dropspin.comparisons.diagnosis.source import read_source
 from dropspin.comparisons.engines.mujoco_simulation import quiet
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.state import Array
+from dropspin.scenarios.text import printable
 from dropspin.scenarios.truths.soft_rest import GeomSettings, mixed
 
 BODY, GEOM = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_GEOM
@@ -78,7 +79,16 @@ class MuJoCoFile:
     def names(self, kind: Any) -> dict[str, int]:
         """The numbers of bodies or geometries by name; one without a name is called by its kind and number."""
         what, number = ("body", self.model.nbody) if kind == BODY else ("geom", self.model.ngeom)
-        return {mujoco.mj_id2name(self.model, kind, one) or f"{what} {one}": one for one in range(number)}
+        return {printable(mujoco.mj_id2name(self.model, kind, one) or f"{what} {one}"): one for one in range(number)}
+
+    @cached_property
+    def unchanged(self) -> Any:
+        """The model with the masses and inertias that the file has, before the compiler changes them; impossible ones are balanced."""
+        spec = self._spec.copy()
+        spec.compiler.boundmass, spec.compiler.boundinertia, spec.compiler.settotalmass = 0.0, 0.0, -1.0
+        spec.compiler.balanceinertia, spec.compiler.inertiafromgeom = True, mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
+        with quiet():
+            return spec.compile()
 
     @cached_property
     def heads(self) -> dict[str, int]:
@@ -100,8 +110,10 @@ class MuJoCoFile:
         found = wanted or [name for name in heavy if loose or self.is_free(self.heads[name]) or (self.is_urdf and len(heavy) == 1)]
         if not found:
             if not heavy:
-                raise DropspinError(f"{self.given}: no body both moves and has mass; give a body a free joint and a mass.")
-            are = "moves on joints or is tied" if len(heavy) == 1 else "move on joints or are tied"
+                needed = "a link a mass above 0" if self.is_urdf else "a body a free joint and a mass"
+                raise DropspinError(f"{self.given}: no body both moves and has mass; give {needed}.")
+            are = "moves on joints, carries others on joints or is tied"
+            are = are if len(heavy) == 1 else "move on joints, carry others on joints or are tied"
             there = f"{', '.join(heavy[:MOST_NAMES])}{' and others' * (len(heavy) > MOST_NAMES)} {are}"
             raise DropspinError(f"{self.given}: no body is free: {there}; name one with --body, or give --loose for all.")
         return list(found)
@@ -145,6 +157,7 @@ class MuJoCoFile:
         dofs = np.flatnonzero(np.isin(model.dof_bodyid, self.group(body)))
         found = [words for words, columns in self._coupled.items() if np.isin(columns, dofs).any()]
         found += [words for field, words in UNMODELLED.items() if getattr(model, field, 0)]
+        found += ["the stiffness of its joint"] * bool(joint >= 0 and np.any(model.jnt_stiffness[joint]))
         if joint >= 0 and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
             turn = model.jnt_qposadr[joint] + np.arange(3, 7)
             turned = np.abs(model.key_qpos[:, turn] @ model.qpos0[turn]) < 1.0 - TURNED
@@ -180,7 +193,7 @@ class MuJoCoFile:
         for pair in range(model.npair):
             if {model.pair_geom1[pair], model.pair_geom2[pair]} == {first, second}:
                 names = ("friction", "solref", "solreffriction", "solimp", "margin", "gap")
-                return {"condim": model.pair_dim[pair]} | {name: getattr(model, f"pair_{name}")[pair] for name in names}
+                return {"condim": model.pair_dim[pair]} | {name: getattr(model, f"pair_{name}")[pair] for name in names} | self.overrides
         types, affinities = model.geom_contype, model.geom_conaffinity
         bodies = [model.geom_bodyid[geom] for geom in (first, second)]
         excluded = [(bodies[0] << 16) + bodies[1], (bodies[1] << 16) + bodies[0]]
@@ -194,7 +207,15 @@ class MuJoCoFile:
             "friction": np.array(both.friction)[[0, 0, 1, 2, 2]],
             "margin": both.margin,
             "gap": model.geom_gap[[first, second]].sum(),
-        }
+        } | self.overrides
+
+    @property
+    def overrides(self) -> dict[str, Any]:
+        """The settings that all contacts have if the flag `override` is set."""
+        option = self.model.opt
+        if not option.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE:
+            return {}
+        return {name: np.array(getattr(option, f"o_{name}")) for name in ("solref", "solimp", "friction", "margin")}
 
     def _settings_of(self, geom: int) -> GeomSettings:
         model, names = self.model, ("solref", "solimp", "friction", "condim", "margin", "priority", "solmix")
@@ -215,6 +236,30 @@ def set_options(option: Any, compiled: Any, dt: float, changes: Changes) -> None
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
 
 
+def mass_properties(model: Any, data: Any, group: Sequence[int]) -> MassProperties | None:
+    """Those of a body and what is welded to it, in the frame of the body, the first of the group; None without mass."""
+    masses, origin, turn = model.body_mass[group], data.xpos[group[0]], data.xmat[group[0]].reshape(3, 3)
+    if not masses.sum() > 0.0:
+        return None
+    points = (data.xipos[group] - origin) @ turn
+    centre, inertia = np.average(points, axis=0, weights=masses), np.zeros((3, 3))
+    for mass, moments, axes, arm in zip(masses, model.body_inertia[group], data.ximat[group], points - centre, strict=True):
+        turned = turn.T @ axes.reshape(3, 3)
+        inertia += turned @ np.diag(moments) @ turned.T + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return MassProperties(float(masses.sum()), centre, inertia)
+
+
+@cache
+def lowers_margin() -> bool:
+    """Whether contacts act only below margin - gap, as in older versions of MuJoCo; in newer ones they act below the margin."""
+    ball = '<worldbody><geom type="plane" size="0 0 1"/><body><freejoint/><geom size="1" margin="2" gap="1"/></body></worldbody>'
+    model = mujoco.MjModel.from_xml_string(f"<mujoco>{ball}</mujoco>")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return bool(data.contact.includemargin[0] < 2.0)
+
+
 def one_line(error: Exception) -> str:
     """The message of an error of MuJoCo, in one line."""
-    return " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
+    text = " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
+    return f"{text} within the memory that dropspin allows an engine" if "allocate memory" in text else text

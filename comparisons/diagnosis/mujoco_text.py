@@ -1,5 +1,6 @@
 """A body of an MJCF or URDF file in the file's own words: its settings with their lines, and what MuJoCo changes or does not use."""
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 
@@ -7,7 +8,8 @@ import mujoco
 import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import digits
-from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile
+from dropspin.comparisons.diagnosis.loose_body import MassProperties
+from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile, mass_properties
 from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
@@ -18,9 +20,13 @@ MOST_URGENT = 9
 SAME = 1e-6
 """Relative difference up to which a moment of inertia is the one that was written."""
 IN_FORCE = {"lateral_friction": 1.0, "rolling_friction": 0.0, "spinning_friction": 0.0, "restitution": 0.0}
+IN_FORCE |= {"stiffness": math.nan, "damping": math.nan}
 """The settings of a contact in a URDF file, which MuJoCo does not read, and what it has instead."""
-CHANGED_BY = ("balanceinertia", "boundinertia", "boundmass", "settotalmass", "inertiafromgeom")
-"""Settings of the compiler that change the inertia of a file."""
+CHANGED_BY = {
+    "mass": ("boundmass", "settotalmass", "inertiafromgeom"),
+    "inertia": ("balanceinertia", "boundinertia", "settotalmass", "inertiafromgeom"),
+}
+"""Settings of the compiler that change the mass and the inertia of a file."""
 
 
 class BodyText:
@@ -46,8 +52,20 @@ class BodyText:
         return named[0] if named else None
 
     @cached_property
-    def written(self) -> Array | None:
-        """The inertia that the file has for a body to which nothing is welded, about its own axes."""
+    def written(self) -> MassProperties | None:
+        """What the file says of the body and of what is welded to it, with moments that MuJoCo would balance as they are written."""
+        model, tensor = self._file.unchanged, self._tensor
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        found = mass_properties(model, data, self._file.group(self._head))
+        if found is None or tensor is None:
+            return found
+        wanted, has = np.linalg.eigvalsh(tensor), np.linalg.eigvalsh(found.inertia)
+        return found._replace(inertia=tensor) if np.abs(wanted - has).max() > SAME * np.abs(wanted).max() else found
+
+    @cached_property
+    def _tensor(self) -> Array | None:
+        """The tensor that is written for a body to which nothing is welded, about the axes of its inertial frame."""
         inertial = None if self.element is None else next(self.element.every("inertial"), None)
         if inertial is None or len(self._file.group(self._head)) > 1:
             return None
@@ -65,6 +83,7 @@ class BodyText:
         root, body = self._file.source, self.element
         options = {"timestep": "0.002", "integrator": "Euler", "cone": "pyramidal", "impratio": "1", "density": "0", "viscosity": "0"}
         found = {name: option_setting(root, "option", name, default) for name, default in options.items()}
+        overrides = {name: option_setting(root, "option", f"o_{name}", "") for name in self._file.overrides}
         if body is None:
             return found
         places: dict[str, list[Element]] = {"gravcomp": [body]} | dict.fromkeys(OF_JOINT, self._joint)
@@ -74,9 +93,10 @@ class BodyText:
         if inertial is not None:
             tensor = next(inertial.every("inertia"), None)  # of URDF
             names = ("diaginertia", "fullinertia", "mass")
+            written["mass"] = [inertial.setting("mass") or next((one.words for one in inertial.every("mass")), None)]
             written["inertia"] = [inertial.setting(name) for name in names] if tensor is None else [tensor.words]
         # Of several places, the first one counts.
-        return found | {name: one for name, several in written.items() for one in reversed(several) if one}
+        return found | {name: one for name, several in written.items() for one in reversed(several) if one} | overrides
 
     @cached_property
     def _joint(self) -> list[Element]:
@@ -121,23 +141,25 @@ class BodyText:
             found += [geom.changed(contact | {"priority": MOST_URGENT}) for geom in self._geoms[:1]]
         return ", ".join(map(str, found)) or " ".join(f'{name}="{value}"' for name, value in others.items())
 
-    def ignored(self, inertia: Array, *, raised: bool) -> Iterator[tuple[str, Setting, str]]:
+    def ignored(self, in_force: MassProperties, *, raised: bool) -> Iterator[tuple[str, Setting, str]]:
         """What the file says and MuJoCo changes or does not use.
 
         Args:
-            inertia: The inertia in force [kg m²], shape (3, 3).
+            in_force: The mass and the inertia in force.
             raised: Whether the time constant of a contact is raised.
         """
-        settings, written, root = self.settings, self.written, self._file.source
+        settings, written = self.settings, self.written
         if raised:
             constant = 2.0 * self._file.model.opt.timestep
             yield "solref", settings.get("solref", Setting("solref")), f"raised to a time constant of {constant:g} s, two time steps"
         if written is not None:
-            wanted, has = np.linalg.eigvalsh(written), np.linalg.eigvalsh(inertia)
+            wanted, has = np.linalg.eigvalsh(written.inertia), np.linalg.eigvalsh(in_force.inertia)
+            if abs(written.mass - in_force.mass) > SAME * written.mass:
+                yield self._changed("mass", f"changed: {in_force.mass:.4g} kg")
             if np.abs(wanted - has).max() > SAME * np.abs(wanted).max():
-                why = [str(s) for name in CHANGED_BY if (s := option_setting(root, "compiler", name, "")).file]
                 made = f"refused ({self._file.refusal}); measured with balanceinertia" if self._file.refusal else "changed"
-                yield "inertia", settings["inertia"], f"{made}: moments {digits(has.tolist())} kg m²" + (f", by {why[0]}" if why else "")
+                made = made if wanted.any() else "0, with which MuJoCo simulates no body; measured with that of a uniform solid"
+                yield self._changed("inertia", f"{made}: moments {digits(has.tolist())} kg m²")
         if self._file.is_urdf:
             element = self.element
             if self._file.model.body_weldid[self._head] == 0:
@@ -146,3 +168,12 @@ class BodyText:
                 for found in [] if element is None else element.every(tag):
                     if found.number("value", value) != value:
                         yield tag, found.words, "not read"
+
+    def _changed(self, name: str, made: str) -> tuple[str, Setting, str]:
+        """A quantity that the compiler changes, with what is written, and the setting that changes it."""
+        found = [option_setting(self._file.source, "compiler", setting, "") for setting in CHANGED_BY[name]]
+        why = [setting for setting in found if setting.file]
+        written = self.settings.get(name)
+        if written is None:
+            return name, why[0] if why else Setting(name), made
+        return name, written, made + (f", by {why[0]}" if why else "")

@@ -6,16 +6,15 @@ the inertial frame whose pose PyBullet reports.
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pybullet_data  # type: ignore[import-untyped]
 
 from dropspin.comparisons.diagnosis.inertia import inertia
-from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody
+from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
 from dropspin.comparisons.diagnosis.parts import Part, Support, at_point
 from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Ignored, read_links
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
@@ -57,6 +56,7 @@ WRITTEN = (
     ("rolling_friction", "value", "rolling"),
     ("inertia", "ixx", "inertia"),
     ("mass", "value", "mass"),
+    ("stiffness", "value", "stiffness"),
 )
 """Elements and attributes of URDF, and the names of their settings."""
 
@@ -88,8 +88,6 @@ class PyBulletBody(LooseBody):
         DropspinError: PyBullet gives the body no mass or no inertia.
     """
 
-    causes: ClassVar[Mapping[str, tuple[str, ...]]] = {"impact": ("contactERP",)}
-
     def __init__(self, model: PyBulletModel, name: str, changes: Changes) -> None:
         self._model, self._name, self._changes = model, name, changes
         self._file = str(model.path) if len(model.heads) == 1 else model.cut_loose(name)
@@ -107,6 +105,7 @@ class PyBulletBody(LooseBody):
         centre = np.average(centres, axis=0, weights=self._masses)
         self._arms, self._arm = centres - centre, unrotate(first.turn, centre - first.position)
         self.facts = self._facts(centre, own)
+        self.causes = {"impact": ("contactERP",) if "stiffness" not in self.facts.settings else ("stiffness",)}
         self.remedies = {"damping": {"damping": 0.0}, "inertia": {"inertia": "file"}, "contactERP": {"contactERP": 0.0}}
         if first.restitution > 0.0:
             self.remedies["restitution"] = {"restitution": 1.0}
@@ -169,6 +168,7 @@ class PyBulletBody(LooseBody):
         kappa = 0.0 if "damping" in self._changes else DAMPING
         plane = server().getDynamicsInfo(self._plane, -1)
         parts = [part for link in self._links for part in link.parts(self._model, centre)]
+        written = self._links[0].written
         touching = next((link for link in self._links if link.geometry), self._links[0])
         margin = MARGIN if parts and _bottom(parts).shape.shape == "mesh" else 0.0
         facts = Facts(
@@ -190,7 +190,7 @@ class PyBulletBody(LooseBody):
             margin=margin,
             rolling=touching.dynamics[6] > 0.0,
             rest_depth=SLOP - margin if touching.dynamics[9] < 0.0 else math.nan,
-            written=self._links[0].written if len(self._links) == 1 else None,
+            written=None if written is None or len(self._links) > 1 else MassProperties(mass, np.zeros(3), written),
             settings=self._settings(),
             ignored=self._ignored(plane[5]),
             unmodelled=["joints"] if len(self._model.heads) > 1 else [],

@@ -19,6 +19,7 @@ from dropspin.scenarios.bodies.hull import convex_hull
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.rotations import conjugate, multiply, rotate
 from dropspin.scenarios.state import Array
+from dropspin.scenarios.text import printable
 
 MARGIN = 1e-3  # m; what Bullet adds to convex hulls
 SAME = 0.01
@@ -133,7 +134,7 @@ def read_links(file: UrdfFile, body: int) -> list[Link]:
         else:
             name, pose = bullet.getJointInfo(body, number)[12], bullet.getLinkState(body, number, computeForwardKinematics=True)
         read = bullet.getDynamicsInfo(body, number), bullet.getCollisionShapeData(body, number)
-        found.append(Link(file.links[name.decode()], *read, np.array(pose[0]), np.array(pose[1])))
+        found.append(Link(file.links[printable(name.decode())], *read, np.array(pose[0]), np.array(pose[1])))
     return found
 
 

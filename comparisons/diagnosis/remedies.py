@@ -106,8 +106,9 @@ def _tries(body: LooseBody, answer: Answer, finding: Finding) -> Iterator[tuple[
         if finding.kind == "model":
             yield (name,), _rounded(0.125 * dt)
     if "timestep" in finding.settings:
-        excess = abs(answer.measured - answer.in_force) / (100.0 if answer.unit == "%" else abs(answer.in_force) or 1.0) / NOTEWORTHY
-        yield (), _rounded(dt * (SAFE / excess if excess > 1.0 else 0.25))
+        scale = 100.0 if answer.unit == "%" else abs(answer.in_force) or 1.0
+        excess = math.inf if answer.question == "rest" else abs(answer.measured - answer.in_force) / scale / NOTEWORTHY
+        yield (), _rounded(dt * (SAFE / excess if 1.0 < excess < math.inf else 0.25))
     together = tuple(name for name in known if name not in body.causes.get(answer.question, ()))
     if len(together) > 1 and not finding.is_error:
         yield together, dt

@@ -96,12 +96,18 @@ def _read(path: Path, home: Path, within: tuple[Path, ...], count: list[int]) ->
     if path.resolve() in within:
         raise DropspinError(f"{path}: includes itself, by way of {within[-1].name}; remove the include.")
     raw = read_file(path, str(path), "model", LARGEST_FILE)
+    try:
+        raw.decode()
+    except UnicodeDecodeError:
+        raise DropspinError(f"{path}: is not encoded as UTF-8; save it as UTF-8.") from None
     parser, stack = expat.ParserCreate(), [Element("", {}, path.name, 0)]
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         count[0] += 1
         if count[0] > MOST_ELEMENTS:
             raise DropspinError(f"{path}: has more than {MOST_ELEMENTS:,} elements; give a smaller model.")
+        if tag.startswith("xacro:"):
+            raise DropspinError(f"{path}: line {parser.CurrentLineNumber}: has macros; expand them first, with: xacro {path.name}")
         element = Element(tag, attributes, path.name, parser.CurrentLineNumber, stack[-1])
         stack[-1].children.append(element)
         stack.append(element)

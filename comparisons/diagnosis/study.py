@@ -21,6 +21,7 @@ from dropspin.comparisons.running.parallel import results_in_parallel, started_c
 from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
+from dropspin.scenarios.bodies.mesh import is_closed
 from dropspin.scenarios.bodies.mesh_files import read_mesh
 
 if TYPE_CHECKING:  # each engine is imported in its own process alone
@@ -140,7 +141,10 @@ def diagnose(
             raise DropspinError(f"{engine} does not read {ending} files; use {' or '.join(READERS[ending])}.")
     with tempfile.TemporaryDirectory() as folder:
         if ending in (".obj", ".stl"):
-            read_mesh(path, given)
+            if not is_closed(*read_mesh(path, given)):
+                raise DropspinError(
+                    f"{given}: the mesh is not closed, so that it has no volume; close it, or give the body in an MJCF file."
+                )
             text = MESH.format(path=path.resolve(), name=path.stem, density=density)
             path = Path(folder, "mesh.xml")
             path.write_text(text, encoding="utf-8")
@@ -158,6 +162,8 @@ def diagnose(
                 entry, name = piece
                 report(f"{name} with {entry.label}")
                 found = processes.call(entry, _diagnosed, path, given, name, on, Targets(restitution, friction))
+                if isinstance(found, DropspinError) and refused:
+                    raise DropspinError(" ".join(str(why) for why in (*(why for _, why in refused), found)))
                 return BodyDiagnosis(name, entry.label, breakdown=found.reason) if isinstance(found, Breakdown) else _checked(given, found)
 
             return Diagnosis(given, (*refusals, *results_in_parallel(pieces, of_body, crews, on_progress or ignore)))

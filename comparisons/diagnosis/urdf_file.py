@@ -8,6 +8,7 @@ from xml.sax.saxutils import quoteattr
 from dropspin.comparisons.diagnosis.source import Element, read_source
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
+from dropspin.scenarios.text import printable
 
 FIXED = ("fixed", "floating")
 """Types of joints of which PyBullet makes fixed ones."""
@@ -27,7 +28,7 @@ class UrdfFile:
     def __init__(self, path: Path, given: str) -> None:
         self.path, self.given = path, given
         source = read_source(path)
-        self.links = {link.attributes.get("name", ""): link for link in source.children if link.tag == "link"}
+        self.links = {printable(link.attributes.get("name", "")): link for link in source.children if link.tag == "link"}
         self._parents = {_end(joint, "child"): joint for joint in source.children if joint.tag == "joint"}
         roots = [name for name in self.links if name not in self._parents]
         if len(roots) != 1:  # PyBullet ends the process
@@ -87,7 +88,7 @@ class UrdfFile:
 
 def _end(joint: Element, which: str) -> str:
     """The parent or the child of a joint."""
-    return next((end.attributes.get("link", "") for end in joint.every(which)), "")
+    return printable(next((end.attributes.get("link", "") for end in joint.every(which)), ""))
 
 
 def _is_heavy(link: Element) -> bool:

@@ -103,8 +103,17 @@ def spin_about_axis(
     return spin * np.exp(-rate) / (1.0 + quadratic * abs(spin) / resisting * np.asarray(t) * phi1(rate))
 
 
-def time_constant(spin: float, inertia: float, armature: float = 0.0, linear: float = 0.0, quadratic: float = 0.0) -> float:
-    """The time [s] after which a spin about a principal axis is 1/e of ω₀; infinite without damping. Arguments: `spin_about_axis`."""
+def time_constant(
+    spin: float, inertia: float, armature: float = 0.0, linear: float = 0.0, quadratic: float = 0.0, cubic: float = 0.0
+) -> float:
+    """The time [s] after which a spin about a principal axis is 1/e of ω₀; infinite without damping. Arguments: `spin_about_axis`.
+
+    With a torque c₃ ω³ [N m s³/rad³] it is the integral of J/(c₁ + c₂ |ω| + c₃ ω²) over log ω.
+    """
+    if cubic:
+        nodes, weights = np.polynomial.legendre.leggauss(40)
+        speeds = abs(spin) * np.exp(0.5 * (nodes - 1.0))
+        return float((inertia + armature) * 0.5 * weights @ (1.0 / (linear + speeds * (quadratic + speeds * cubic))))
     resistance = linear + quadratic * abs(spin)
     if not resistance:
         return math.inf

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from support.model_files import FREE, PLANE, body_of, by_quantity, findings_of, ladder
 
 from dropspin.comparisons.diagnosis.answers import REBOUND
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble, worst_tumble
@@ -12,34 +13,9 @@ from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
 from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
-from dropspin.comparisons.diagnosis.study import QUESTIONS
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.state import POSITION, UP
 from dropspin.scenarios.truths.settings import fall as damped_fall
-
-FREE = '<body name="b" pos="0 0 1"><freejoint/>{}</body>'
-PLANE = '<geom name="floor" type="plane" size="1 1 .1"/>'
-
-
-def body_of(tmp_path, world, option="", head="", name=None, on=None, file="model.xml"):
-    text = world if world.startswith("<robot") else f"<mujoco>{head}<option {option}/><worldbody>{PLANE}{world}</worldbody></mujoco>"
-    (tmp_path / file).write_text(text)
-    model = MuJoCoModel(tmp_path / file, file)
-    return model.body(name or model.bodies([], False)[0], on)
-
-
-def ladder(body):
-    return [body.facts.dt, body.facts.dt / 2.0, body.facts.dt / 4.0]
-
-
-def by_quantity(answers):
-    return {answer.quantity: answer for answer in answers}
-
-
-def findings_of(body, *questions):
-    """Each finding, with its answer."""
-    answers = [answer for question in questions or QUESTIONS for answer in answers_to(question, body)]
-    return [(answer, finding) for answer in answers for finding in answer.findings]
 
 
 def test_healthy_ball_has_no_finding(tmp_path):
@@ -231,10 +207,13 @@ def test_welded_parts_and_an_offset_centre_move_as_in_mujoco(tmp_path):
         ('<mujoco><worldbody><body><freejoint/><geom size="nan"/></body></worldbody></mujoco>', "MuJoCo does not compile it"),
         ("<mujoco/>", "no body both moves and has mass"),
         ('<mujoco><worldbody><body name="arm"><joint/><geom size=".1"/></body></worldbody></mujoco>', "--loose"),
+        ('<robot name="r"><link name="b"/></robot>', "give a link a mass above 0"),
+        ('<robot name="r"><xacro:property name="m" value="1"/></robot>', "has macros; expand them first"),
+        ('<?xml version="1.0" encoding="ISO-8859-1"?><mujoco model="\xe9"/>'.encode("latin-1"), "is not encoded as UTF-8"),
     ],
 )
 def test_wrong_file_ends_in_one_line(tmp_path, text, message):
-    (tmp_path / "bad.xml").write_text(text)
+    (tmp_path / "bad.xml").write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(DropspinError, match=message) as error:
         MuJoCoModel(tmp_path / "bad.xml", "bad.xml").bodies([], False)
     assert "\n" not in str(error.value)

@@ -128,7 +128,7 @@ def test_an_inertia_that_is_not_in_force_is_named(tmp_path):
     same = body(tmp_path, link(BOX, "1", (0.0034 / 12, 0.0234 / 12, 0.025 / 12)))
     assert same.facts.ignored == []
     turned = body(tmp_path, link(BOX, "1", (1e-3, 2e-3, 2.5e-3), at='<origin xyz=".1 0 0" rpy="0 0 1.5707963267948966"/>'))
-    np.testing.assert_allclose(turned.facts.written, np.diag([2e-3, 1e-3, 2.5e-3]), atol=1e-9)
+    np.testing.assert_allclose(turned.facts.written.inertia, np.diag([2e-3, 1e-3, 2.5e-3]), atol=1e-9)
     answers = inertia(body(tmp_path, link(BOX, "1", (1e-3, 1e-3, 2.5e-3))).facts)
     assert named(answers, "largest moment / sum of others").measured == pytest.approx(1.25)
 

@@ -66,12 +66,14 @@ def test_one_body_has_its_answers_and_a_missed_target_fails(model):
         (["two.xml", "--body", "heavy", "--on", "geom 4"], "neither a plane nor a box"),
         (["many.xml"], "more than 100,000 elements"),
         (["bare.xml"], "Error opening file"),
+        (["open.obj"], "the mesh is not closed"),
     ],
 )
 def test_wrong_file_or_name_ends_in_one_line(model, arguments, message):
     (model / "many.xml").write_text(f"<mujoco><worldbody>{'<geom/>' * 100_001}</worldbody></mujoco>")
     mesh = '<asset><mesh name="m" file="none.stl"/></asset><worldbody><body><freejoint/><geom type="mesh" mesh="m"/></body></worldbody>'
     (model / "bare.xml").write_text(f"<mujoco>{mesh}</mujoco>")
+    (model / "open.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n")
     done = dropspin("diagnose", *arguments, cwd=model)
     assert (done.returncode, done.stdout) == (2, "")
     assert message in done.stderr.splitlines()[-1]
@@ -111,3 +113,15 @@ def test_urdf_that_one_engine_refuses_is_diagnosed_in_the_other(tmp_path):
     refused, measured, *_ = done.stdout.splitlines()
     assert "MuJoCo does not compile it: XML Error: required attribute missing: 'ixy'" in refused
     assert measured.startswith("brick: box, 2 kg; PyBullet")
+
+
+def test_message_of_an_engine_that_refuses_a_file_is_not_lost(model):
+    """MuJoCo says where the comma is; PyBullet reads a box of size 0, and has no result either."""
+    inertia = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+    shape = '<collision><geometry><box size="0,2 0,1 0,06"/></geometry></collision>'
+    (model / "comma.urdf").write_text(f'<robot name="r"><link name="b">{inertia}{shape}</link></robot>')
+    done = dropspin("diagnose", "comma.urdf", cwd=model)
+    assert done.returncode == 2
+    message = " ".join(done.stderr.split())
+    assert "bad format in attribute 'size'" in message
+    assert "PyBullet gives link b the mass 1 kg and the moments 0, 0, 0 kg m²" in message

@@ -1,0 +1,177 @@
+"""Settings of MJCF and URDF files that change what a body's exact motion is, compared with closed forms and other integrations."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from support.model_files import FREE, body_of, by_quantity, findings_of, ladder
+
+from dropspin.comparisons.diagnosis.answers import DECAY_TIME
+from dropspin.comparisons.diagnosis.flight import fall, spin
+from dropspin.comparisons.diagnosis.friction import slide
+from dropspin.comparisons.diagnosis.inertia import inertia
+from dropspin.comparisons.diagnosis.landing import rest
+from dropspin.comparisons.diagnosis.remedies import answers_to
+from dropspin.scenarios.truths.settings import time_constant
+
+HALF = (0.1, 0.05, 0.03)
+MOMENTS = [sum(h * h for j, h in enumerate(HALF) if j != axis) / 3.0 for axis in range(3)]  # of 1 kg
+BOX = '<geom name="g" type="box" size=".1 .05 .03" mass="1"/>'
+LINK = '<robot name="r"><link name="b">{}<collision>{}<geometry><box size=".2 .1 .06"/></geometry></collision></link></robot>'
+
+
+def numbers(values):
+    return " ".join(map(str, values))
+
+
+def turned(quat, attribute, values):
+    return FREE.format(f'<inertial pos="0 0 0" quat="{quat}" mass="1" {attribute}="{numbers(values)}"/>{BOX}')
+
+
+def impossible(body):
+    return [answer for answer in inertia(body.facts) if answer.findings]
+
+
+@pytest.mark.parametrize("order", [(2, 1, 0), (0, 1, 2)], ids=["right", "wrong"])
+def test_inertia_is_that_about_the_turned_axes_of_its_frame(tmp_path, order):
+    """A quarter turn about y exchanges x and z: moments in the order z, y, x are those of the box, and in the order x, y, z are not."""
+    moments = [MOMENTS[axis] for axis in order]
+    body = body_of(tmp_path, turned(".70710678 0 .70710678 0", "diaginertia", moments))
+    assert body.facts.written.inertia == pytest.approx(np.diag(moments[::-1]), abs=1e-9)
+    assert body.facts.ignored == []
+    if order == (2, 1, 0):
+        assert impossible(body) == []
+    else:
+        [answer] = impossible(body)
+        x, y, z = moments[::-1]
+        assert answer.measured == pytest.approx(max((y + z - x) / 2 / HALF[0] ** 2, (x + y - z) / 2 / HALF[2] ** 2), rel=2e-3)
+
+
+def test_turned_frame_of_a_urdf(tmp_path):
+    x, y, z = MOMENTS
+    tensor = f'<inertia ixx="{z}" ixy="0" ixz="0" iyy="{y}" iyz="0" izz="{x}"/>'
+    inertial = f'<inertial><origin rpy="0 1.5707963267948966 0"/><mass value="1"/>{tensor}</inertial>'
+    body = body_of(tmp_path, LINK.format(inertial, ""), file="box.urdf")
+    assert np.diag(body.facts.written.inertia) == pytest.approx(MOMENTS, rel=1e-6)
+    assert impossible(body) == []
+
+
+def test_inertia_of_zero_is_impossible_and_that_of_a_solid_is_simulated(tmp_path):
+    tensor = '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>'
+    body = body_of(tmp_path, LINK.format(f'<inertial><mass value="1"/>{tensor}</inertial>', ""), file="box.urdf")
+    [answer] = impossible(body)
+    assert (answer.quantity, answer.measured) == ("least moment / largest", 0.0)
+    assert np.diag(body.facts.inertia) == pytest.approx(MOMENTS, rel=1e-9)
+    assert "measured with that of a uniform solid" in {name: made for name, _, made in body.facts.ignored}["inertia"]
+
+
+def test_wrong_centre_of_mass_is_told_from_wrong_moments(tmp_path):
+    inertial = f'<inertial pos="0 0 0" mass="1" diaginertia="{numbers(MOMENTS)}"/>'
+    body = body_of(tmp_path, FREE.format(inertial + BOX.replace("/>", ' pos="0 0 .03"/>')))
+    [answer] = impossible(body)
+    assert (answer.quantity, answer.measured) == ("distance of the centre of mass from a solid's", pytest.approx(0.03))
+    assert "displaced by (0, 0, 0.03) m" in answer.findings[0].remedies[0].text
+
+
+def test_mass_and_inertia_that_the_compiler_changes_are_said(tmp_path):
+    body = body_of(tmp_path, FREE.format(BOX), head='<compiler boundmass="3" boundinertia=".02"/>')
+    changed = {name: (setting.text, made) for name, setting, made in body.facts.ignored}
+    assert changed == {
+        "mass": ('boundmass="3"', "changed: 3 kg"),
+        "inertia": ('boundinertia=".02"', "changed: moments 0.02, 0.02, 0.02 kg m²"),
+    }
+    assert impossible(body) == []
+
+
+def test_damping_by_the_cube_of_the_speed(tmp_path):
+    first, second, third = damping = (0.1, 0.2, 0.05)
+    world = f'<body name="b" pos="0 0 1"><joint type="free" damping="{numbers(damping)}"/>{BOX}</body>'
+    body = body_of(tmp_path, world)
+    solved = solve_ivp(lambda _, y: [y[1], 9.81 - y[1] * (first + y[1] * (second + y[1] * third))], (0, 1), [0, 0], rtol=1e-12, atol=1e-12)
+    [fallen, _] = fall(body, ladder(body))
+    assert fallen.in_force == pytest.approx(solved.y[0, -1], rel=1e-9)
+    assert fallen.measured == pytest.approx(fallen.in_force, rel=2e-3)
+    exact, _ = quad(lambda w: 1.0 / (w * (first + w * (second + w * third))), 10.0 / math.e, 10.0, epsrel=1e-13)
+    assert time_constant(10.0, 0.3, 0.2, *damping) == pytest.approx(0.5 * exact, rel=1e-12)
+    assert time_constant(10.0, 0.3, 0.2, first, second, 1e-12) == pytest.approx(time_constant(10.0, 0.3, 0.2, first, second), rel=1e-9)
+
+
+def test_damping_acts_at_the_origin_of_the_joint(tmp_path):
+    """Of a centre of mass away from it, a spin decays by the force as well: at a finer step, MuJoCo alone has the exact time."""
+    inertial = f'<inertial pos=".2 0 0" mass="1" diaginertia="{numbers(MOMENTS)}"/>'
+    world = f'<body name="b" pos="0 0 1"><joint type="free" damping=".1"/>{inertial}{BOX}</body>'
+    body = body_of(tmp_path, world, 'timestep="2e-4" integrator="RK4"')
+    about_y = {answer.direction: answer for answer in spin(body, [body.facts.dt]) if answer.quantity == DECAY_TIME}["y"]
+    assert about_y.measured == pytest.approx(about_y.in_force, rel=1e-5)
+    assert about_y.in_force < 0.97 * MOMENTS[1] / 0.1
+
+
+def test_damper_that_a_step_of_rk4_does_not_resolve_is_an_error_of_the_step(tmp_path):
+    world = f'<body name="b" pos="0 0 1"><joint type="free" damping="2"/>{BOX}</body>'
+    body = body_of(tmp_path, world, 'integrator="RK4"')
+    about_x = next(iter(answers_to(spin, body)))
+    assert 2.0 * body.facts.dt / MOMENTS[0] > 2.785  # where RK4 is unstable
+    assert (about_x.measured, [found.kind for found in about_x.findings]) == (math.inf, ["time step"])
+
+
+@pytest.mark.parametrize(
+    ("body", "option", "head", "raised"),
+    [
+        ('gravcomp="0.5"', "", "", 0.0),
+        ("", 'o_margin="0.01"', '<option><flag override="enable"/></option>', 0.01),
+    ],
+    ids=["half of the weight", "override"],
+)
+def test_depth_at_rest_follows_from_what_is_in_force(tmp_path, body, option, head, raised):
+    world = FREE.replace("<body", f"<body {body}").format(BOX)
+    found = body_of(tmp_path, world, option, head=head)
+    depth = by_quantity(rest(found, ladder(found)))["penetration"]
+    assert depth.measured == pytest.approx(depth.in_force, abs=1e-8)
+    assert depth.in_force == pytest.approx(-raised, abs=2e-4)
+    settings = [found.facts.settings[name].text for finding in depth.findings for name in finding.settings]
+    assert settings == (['o_margin="0.01"'] if raised else [])
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.005, 0.02])
+def test_gap_does_not_change_where_a_body_rests(tmp_path, gap):
+    body = body_of(tmp_path, FREE.format(BOX.replace("/>", f' margin=".02" gap="{gap}"/>')))
+    [(answer, found)] = findings_of(body, rest)
+    assert (found.settings, answer.measured) == (("margin",), pytest.approx(-0.02, abs=2e-4))
+
+
+def test_body_that_does_not_come_to_rest_is_an_error(tmp_path):
+    body = body_of(tmp_path, FREE.format(BOX.replace("/>", ' solref="-1e6 -100"/>')))
+    found = {answer.quantity: finding.kind for answer, finding in findings_of(body, rest)}
+    assert found["penetration"] == "time step"
+
+
+def test_friction_that_depends_on_the_direction(tmp_path):
+    """In the direction of a slide along x, the second coefficient of a pair acts."""
+    pair = '<contact><pair geom1="g" geom2="floor" friction=".1 .05 .005 .0001 .0001"/></contact>'
+    body = body_of(tmp_path, FREE.format(BOX), head=pair)
+    along, diagonal = slide(body, ladder(body))
+    assert along.in_force == pytest.approx(0.25 / (2.0 * 0.05 * 9.81))
+    assert along.measured == pytest.approx(along.in_force, rel=5e-3)
+    assert (math.isnan(diagonal.in_force), diagonal.findings) == (True, ())
+
+
+def test_short_slide_with_a_large_error_is_a_finding(tmp_path):
+    """A contact that bounces: the elliptic cone does not mend it, and is no remedy."""
+    body = body_of(tmp_path, FREE.format(BOX.replace("/>", ' solref="-1e4 -10"/>')))
+    found = findings_of(body, slide)
+    assert {(answer.direction, finding.kind, finding.remedies) for answer, finding in found} == {("0°", "model", ()), ("45°", "model", ())}
+
+
+def test_stiffness_and_the_direction_of_gravity_are_left_out_and_named(tmp_path):
+    world = f'<body name="b" pos="0 0 1"><joint type="free" stiffness="100"/>{BOX}</body>'
+    assert body_of(tmp_path, world).facts.unmodelled == ["the stiffness of its joint"]
+    for gravity, angle in (("0 0 9.81", 180), ("0 -9.81 0", 90), ("5 0 -5", 45)):
+        facts = body_of(tmp_path, FREE.format(BOX), f'gravity="{gravity}"').facts
+        assert facts.unmodelled == [f"a gravity {angle}° from the inward normal of the surface"]
+        assert facts.lands == (angle < 90)
+
+
+def test_name_with_a_line_break_stays_on_one_line(tmp_path):
+    body = body_of(tmp_path, FREE.replace('"b"', '"b&#10;0 findings."').format(BOX))
+    assert body.facts.name == r"b\n0 findings."

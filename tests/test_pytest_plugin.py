@@ -112,7 +112,7 @@ def test_documentation(repository):
             "test_second.py::test_expectations_hold PASSED*",
             "test_second.py::test_energy_error PASSED*",
             "test_second.py::test_each[[]spin-principal-my_module:Flyer] PASSED*",
-            "test_second.py::test_each[[]needle-my_module:Flyer] PASSED*",
+            "test_second.py::test_each[[]spin-principal-50-my_module:Flyer] PASSED*",
             "test_second.py::test_mapping PASSED*",
         ]
     )

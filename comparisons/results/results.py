@@ -23,7 +23,7 @@ TrajectoryKey = tuple[str, str, float]
 FRAMES = ("table", "predictions", "agreements")
 """The tables of a run."""
 SMALLEST_STATED = 1e-4
-"""Errors below this (relative to the scene's scale, in m or in rad) are not mentioned in summaries and reports."""
+"""Errors below this, in their units (SI, or ratios), are neither mentioned in summaries and reports nor undecided."""
 
 PARTS = ("angular_momentum_direction_error",)
 """Metrics that another metric contains."""

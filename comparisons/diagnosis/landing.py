@@ -89,8 +89,10 @@ def _rebounds(body: LooseBody, speed: float, dt: float, phases: int) -> tuple[Ar
 def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The depth of the body at rest, and its speed there: findings if they differ from the exact ones by 1 % of the body's size."""
     facts = body.facts
+    through = Finding("setting", ("contype", "conaffinity"), detail=facts.missed)
+    support = [Answer("rest", "support", "", detail="none", findings=(through,))] if facts.missed else []
     if not facts.lands:
-        return []
+        return support
     noteworthy = NOTEWORTHY * max(float(np.linalg.norm(facts.points, axis=1).max()), 1e-12)
     depth, speed, tips = _at_rest(body, dts[0])
     depth_error, moving = abs(depth - facts.rest_depth), 0.0 if tips else speed
@@ -100,6 +102,7 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     of_depth = (Finding("setting", ("margin",)),) * floats + _of_error(depth_error, abs(finest_depth - facts.rest_depth), noteworthy)
     of_speed = _of_error(moving, finest_speed, noteworthy)
     return [
+        *support,
         Answer("rest", "penetration", "m", measured=depth, in_force=facts.rest_depth, physical=0.0, findings=of_depth),
         Answer("rest", "drift speed", "m/s", measured=speed, physical=0.0, detail=TIPS * tips, findings=of_speed),
     ]

@@ -75,6 +75,7 @@ class Facts:
         settings: Where settings that matter are written, by the engine's names.
         ignored: What the engine read and does not use, or changes: name, what is written, what is in force.
         unmodelled: What the file has beside the body that the simulations leave out.
+        missed: A plane of the file that the body falls through, and why; empty if there is none.
     """
 
     name: str
@@ -105,6 +106,7 @@ class Facts:
     settings: Mapping[str, Setting]
     ignored: Sequence[tuple[str, Setting, str]]
     unmodelled: Sequence[str]
+    missed: str = ""
 
     @cached_property
     def lowest(self) -> Callable[[Array], Array]:

@@ -165,6 +165,7 @@ class MuJoCoBody(LooseBody):
                 *file.unmodelled(alone.head),
                 *[f"a gravity {off:.3g}° from the inward normal of the surface"] * (off > LEVEL),
             ],
+            missed=file.missed(alone.geoms) if file.gravity.any() and off < 90.0 - LEVEL else "",
         )
 
     @cached_property

@@ -167,11 +167,28 @@ class MuJoCoFile:
 
     def surfaces(self, own: Sequence[int]) -> list[int]:
         """The planes, then the boxes, of the world that some geometries collide with, and if there is none, a plane that is added."""
-        model, geoms = self.model, self.names(GEOM)
-        still = [geom for geom in geoms.values() if model.body_weldid[model.geom_bodyid[geom]] == 0 and geom not in own]
-        ranked = [geom for kind in SURFACES for geom in still if model.geom_type[geom] == kind and geom != geoms[ADDED]]
-        found = [geom for geom in ranked if any(self.contact(one, geom) for one in own)]
-        return found or [geoms[ADDED]] * any(self.contact(one, geoms[ADDED]) for one in own)
+        added, still = self.names(GEOM)[ADDED], self._still(own)
+        ranked = [geom for kind in SURFACES for geom in still if self.model.geom_type[geom] == kind]
+        found = [geom for geom in ranked if self._collide(own, geom)]
+        return found or [added] * self._collide(own, added)
+
+    def missed(self, own: Sequence[int]) -> str:
+        """A plane of the world that some geometries fall through, and why; empty if there is none, or something else to land on."""
+        still, names = self._still(own), list(self.names(GEOM))
+        planes = [geom for geom in still if self.model.geom_type[geom] == PLANE]
+        if not planes or (self.has_contacts and any(self._collide(own, geom) for geom in still)):
+            return ""
+        why = "contacts are disabled" if not self.has_contacts else "no geometry of the body collides with it"
+        return f"{names[planes[0]]} does not hold it, because {why if own else 'the body has no geometry'}"
+
+    def _still(self, own: Sequence[int]) -> list[int]:
+        """The geometries of the world beside some and the plane that is added."""
+        model = self.model
+        still = [geom for geom in range(model.ngeom) if model.body_weldid[model.geom_bodyid[geom]] == 0]
+        return [geom for geom in still if geom not in own and geom != self.names(GEOM)[ADDED]]
+
+    def _collide(self, own: Sequence[int], other: int) -> bool:
+        return any(self.contact(one, other) for one in own)
 
     def surface(self, wanted: str | None, own: Sequence[int]) -> int | None:
         """The geometry that some geometries land on: the one named, or the first one.

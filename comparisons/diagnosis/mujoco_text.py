@@ -87,7 +87,7 @@ class BodyText:
         if body is None:
             return found
         places: dict[str, list[Element]] = {"gravcomp": [body]} | dict.fromkeys(OF_JOINT, self._joint)
-        places |= dict.fromkeys(("margin", "solref", "solimp", "friction", "condim"), self._geoms)
+        places |= dict.fromkeys(("margin", "solref", "solimp", "friction", "condim", "contype", "conaffinity"), self._geoms)
         inertial = next(body.every("inertial"), None)
         written = {name: [mjcf_setting(one, name) for one in elements] for name, elements in places.items()}
         if inertial is not None:

@@ -12,6 +12,7 @@ from dropspin.comparisons.diagnosis.flight import fall, spin
 from dropspin.comparisons.diagnosis.friction import slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import rest
+from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
 from dropspin.comparisons.diagnosis.remedies import answers_to
 from dropspin.scenarios.truths.settings import time_constant
 
@@ -175,3 +176,27 @@ def test_stiffness_and_the_direction_of_gravity_are_left_out_and_named(tmp_path)
 def test_name_with_a_line_break_stays_on_one_line(tmp_path):
     body = body_of(tmp_path, FREE.replace('"b"', '"b&#10;0 findings."').format(BOX))
     assert body.facts.name == r"b\n0 findings."
+
+
+@pytest.mark.parametrize(
+    ("geom", "option", "why"),
+    [
+        (BOX.replace("/>", ' contype="0" conaffinity="0"/>'), "", "no geometry of the body collides with it"),
+        (f'<inertial pos="0 0 0" mass="1" diaginertia="{numbers(MOMENTS)}"/>', "", "the body has no geometry"),
+        (BOX, '<option><flag contact="disable"/></option>', "contacts are disabled"),
+    ],
+    ids=["bits", "bare", "disabled"],
+)
+def test_body_that_falls_through_the_floor(tmp_path, geom, option, why):
+    body = body_of(tmp_path, FREE.format(geom), head=option)
+    [(answer, found)] = findings_of(body, rest)
+    assert (answer.quantity, answer.detail, found.detail) == ("support", "none", f"floor does not hold it, because {why}")
+    assert body_of(tmp_path, FREE.format(BOX)).facts.missed == ""
+
+
+def test_floor_that_collides_with_nothing_is_told_from_the_plane_that_is_added(tmp_path):
+    hidden = '<geom name="hidden" type="plane" size="1 1 .1" contype="0" conaffinity="0"/>'
+    (tmp_path / "model.xml").write_text(f"<mujoco><worldbody>{hidden}{FREE.format(BOX)}</worldbody></mujoco>")
+    facts = MuJoCoModel(tmp_path / "model.xml", "model.xml").body("b", None).facts
+    assert facts.surface == "a plane with default settings"
+    assert facts.missed == "hidden does not hold it, because no geometry of the body collides with it"

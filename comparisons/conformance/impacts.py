@@ -35,11 +35,15 @@ from dropspin.scenarios.variations import with_height
 
 CLOSE = 5e-3
 """The largest difference of an explained change of the velocities, relative to that change; gravity acts before or after an impact."""
+APART = 4.0
+"""Multiple of it by which a stated mistake differs from an impact without rebound."""
 AGAINST = "friction has the wrong sign: it acts along the slip of the contact point, and has to act against it"
 IN_FRICTION = f"{SQUARE}: in friction, whose impulse is at most µ times that of the normal force, along the slip over its length"
 IN_NORMAL = f"{SQUARE}: the separation speed is e times the approach speed"
 REVERSED = "friction has the wrong sign: it reverses the slip of the contact point, and has to reduce it"
 INTO_FLOOR = "restitution has the wrong sign: the contact point goes on into the floor"
+OF_REBOUND = (IN_NORMAL, INTO_FLOOR)
+AT_START = "the inertia is rotated by the orientation at the start: in the world frame it is R I Rᵀ with the R of the impact"
 BY_SLIP = "friction reduces the slip by at most µ (1 + e) times the approach speed, which follows from Coulomb's law for a point mass only"
 OF_NOTE = (
     "impacts follow eq 11 and 15 of Wang's lecture note, whose impulse is not normal to the floor; if this is intended, name 'law note' "
@@ -71,6 +75,7 @@ class Contact(NamedTuple):
         mass: [kg].
         inertia: In the body frame [kg m²].
         axes: R, from body to world.
+        axes_at_start: R at the start of the motion.
         floor: The floor.
     """
 
@@ -79,6 +84,7 @@ class Contact(NamedTuple):
     mass: float
     inertia: Array
     axes: Array
+    axes_at_start: Array
     floor: Floor
 
     @property
@@ -115,13 +121,13 @@ def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:
     before = motion.states[row].copy()
     before[VELOCITY] += case.dt * scene.acceleration
     velocities, after = (np.concatenate([state[VELOCITY], state[SPIN]]) for state in (before, motion.states[row + 1]))
-    axes = rotate(before[ORIENTATION], np.eye(3)).T
-    contact = Contact(velocities, case.contact_point(row), scene.body.mass, scene.body.inertia_tensor, axes, scene.floor)
+    axes, at_start = (rotate(state[ORIENTATION], np.eye(3)).T for state in (before, motion.states[0]))
+    contact = Contact(velocities, case.contact_point(row), scene.body.mass, scene.body.inertia_tensor, axes, at_start, scene.floor)
     weights = np.array([1.0] * 3 + [scene.body.size] * 3)
 
-    def explains(predicted: Array | None) -> bool:
+    def explains(predicted: Array | None, close: float = CLOSE) -> bool:
         scale = np.linalg.norm(weights * (after - velocities))
-        return predicted is not None and bool(np.linalg.norm(weights * (after - predicted)) <= CLOSE * scale)
+        return predicted is not None and bool(np.linalg.norm(weights * (after - predicted)) <= close * scale)
 
     if contact.approach[1] >= 0.0:
         return None
@@ -130,20 +136,23 @@ def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:
     laws = [law for law in LAWS if any(explains(velocities_after(*of_body, floor, law)) for floor in floors)]
     if laws:
         return OF_NOTE if laws == ["note"] and scene.floor == frictionless else None
+    dead = [floor.model_copy(update={"restitution": 0.0}) for floor in floors]  # as when the floor supports a body from the first step on
+    if any(explains(velocities_after(*of_body, floor, law), APART * CLOSE) for floor, law in product(dead, LAWS)):
+        return None
     return next((message for message, predicted in _predictions(contact) if explains(predicted)), None)
 
 
 def _predictions(contact: Contact) -> Iterator[tuple[str, Array]]:
     """Mistakes, and the velocities after an impact with each, shape (6,); the rule of the lecture note's laboratory is the first."""
-    right = INVERSES[""](contact.axes, contact.inertia)
-    for message, impulse in _impulses(contact, response_of(contact.point, contact.mass, right)):
-        yield message, contact.after(impulse, right)
-    for (in_response, of_response), (in_turn, of_turn) in product(INVERSES.items(), repeat=2):
+    inverses = {mistake: inverse(contact.axes, contact.inertia) for mistake, inverse in INVERSES.items()}
+    inverses[AT_START] = INVERSES[""](contact.axes_at_start, contact.inertia)
+    for message, impulse in _impulses(contact, response_of(contact.point, contact.mass, inverses[""])):
+        yield message, contact.after(impulse, inverses[""])
+    for (in_response, of_response), (in_turn, of_turn) in product(inverses.items(), repeat=2):
         if in_response or in_turn:
-            inverses = [inverse(contact.axes, contact.inertia) for inverse in (of_response, of_turn)]
-            for message, impulse in _impulses(contact, response_of(contact.point, contact.mass, inverses[0])):
+            for message, impulse in _impulses(contact, response_of(contact.point, contact.mass, of_response)):
                 if message == BY_SLIP:
-                    yield "; and ".join(dict.fromkeys(filter(None, (in_response, in_turn)))), contact.after(impulse, inverses[1])
+                    yield "; and ".join(dict.fromkeys(filter(None, (in_response, in_turn)))), contact.after(impulse, of_turn)
 
 
 def _impulses(contact: Contact, response: Array) -> Iterator[tuple[str, Array]]:

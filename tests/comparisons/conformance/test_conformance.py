@@ -61,7 +61,7 @@ def test_documented_adapter_passes_and_is_short():
 
 
 ELLIPSOID = {"striking ellipsoid"}
-STRIKES = {"corner", "striking capsule", "striking cylinder", "striking mesh", *ELLIPSOID}
+STRIKES = {"corner", "spinning corner", "striking capsule", "striking cylinder", "striking mesh", *ELLIPSOID}
 
 
 @pytest.mark.extended
@@ -314,6 +314,20 @@ def test_start_that_is_off_by_1e_12_is_not_a_fault_of_convention():
     """The message gives the numbers."""
     found = not_passed(documented(("self.data.qpos = [*x,", "self.data.qpos = [*(x + 1e-12),")), "builds what is meant")
     assert "position at the start is" in found["builds what is meant"][1]
+
+
+@pytest.mark.parametrize(("kind", "shown"), [(object, "object"), (str, "<U32")])
+def test_state_of_another_type_than_real_numbers_is_named(kind, shown):
+    class Typed(made.ExactSimulation):
+        def state(self):
+            return super().state().astype(kind)
+
+    engine_ = type("TypedEngine", (made.Exact,), {"prepare": lambda self, scene, dt: Typed(scene, dt)})()
+    outcome, message = not_passed(engine_, "builds what is meant")["builds what is meant"]
+    assert outcome == "failed"
+    assert message.startswith(
+        f"state() returns an array of {shown}, shape (13,); it must return a NumPy array of 13 real numbers, shape (13,)"
+    )
 
 
 def test_omitted_products_of_inertia_are_named():

@@ -4,13 +4,18 @@ import numpy as np
 import pytest
 from support import engines as made
 from support.bouncing import Bouncing, coulomb, pyramid, with_restitution
-from support.fault_suite import FAULTS
+from support.fault_suite import FAULTS, fault, with_damping
 from support.students import Solver, student
 
 from dropspin.comparisons.conformance.checks import run_check
-from dropspin.comparisons.conformance.probes import PROBES
+from dropspin.comparisons.conformance.impacts import explain_impact
+from dropspin.comparisons.conformance.motions import symptoms
+from dropspin.comparisons.conformance.probes import DT, PROBES
+from dropspin.comparisons.conformance.timing import NO_LAG
+from dropspin.comparisons.faults.mistakes import Mistake
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.scenarios import truth_for
+from dropspin.scenarios import Trajectory, truth_for
+from dropspin.scenarios.rotations import cross, rotate, unrotate
 
 BALLS = tuple(probe.name for probe in PROBES if probe.name.endswith(" ball") or probe.name.endswith(" floor"))
 SQUARED = "restitution appears to be squared; an engine that multiplies the values of two bodies needs 1 for the floor"
@@ -158,3 +163,73 @@ def test_height_of_the_first_contact_is_stated_only_if_it_is_wrong():
 def test_fault_of_a_step_or_an_impact_is_named(title, check, message):
     [fault] = [one for one in FAULTS if one.title == title]
     assert message in failed(fault, check)[check]
+
+
+def rotating(factors=(1.0, 1.0, 1.0), decay=lambda speed: 0.0):
+    """The first symptom of a body whose gyroscopic term has a factor about each axis, and whose angular velocity decays by the speed."""
+
+    def acceleration(q, w, inertia):
+        spin = unrotate(q, w)
+        return rotate(q, np.array(factors) * np.linalg.solve(inertia, cross(inertia @ spin, spin))) - decay(np.linalg.norm(w)) * w
+
+    [probe] = [one for one in PROBES if one.name == "tumbling"]
+    times = DT * np.arange(1 + probe.rows[1])
+    return next(symptoms(probe, Trajectory.from_states(times, Mistake("planted", acceleration).motion(probe.scene, times))))
+
+
+DAMPED = "damping or a clamp that the scene does not have: the final angular momentum is "
+
+
+@pytest.mark.parametrize(
+    ("planted", "message"),
+    [
+        (
+            {"factors": (1.0, 0.5, 1.0)},
+            "damping, a clamp or a wrong gyroscopic term: the final angular momentum is 0.393 kg m²/s instead of ",
+        ),
+        ({"factors": (1.0, -1.0, 1.0)}, "the final angular momentum is 1.2 kg m²/s instead of 0.450444 (170 % too high)"),
+        ({"factors": (0.5, 0.7, 1.0)}, "the final angular momentum is 0.438 kg m²/s instead of 0.450444 (2.8 % too low)"),
+        ({"factors": (0.5, 0.5, 0.5)}, "attitude is off by 0.53 rad"),
+        ({"decay": lambda speed: 0.5}, f"{DAMPED}0.351 kg m²/s instead of 0.450444 (22 % too low)"),
+        ({"decay": lambda speed: 0.02}, f"{DAMPED}0.44596 kg m²/s instead of 0.450444 (1 % too low)"),
+        ({"decay": lambda speed: 50.0 * max(speed - 6.0, 0.0)}, f"{DAMPED}0.40"),
+    ],
+    ids=["gyroscopic term halved", "reversed", "energy gained", "halved about all axes", "damping", "weak damping", "clamp at 6 rad/s"],
+)
+def test_damping_is_named_only_where_angular_momentum_is_lost_without_turning(planted, message):
+    """The angular speed of a body with unequal moments varies, and a wrong gyroscopic term about one axis changes the energy too."""
+    assert rotating(**planted).startswith(message)
+
+
+def test_ball_that_a_floor_supports_from_the_first_step_on_has_no_wrong_restitution():
+    """A floor 1 mm too high: the approach speed in the first step is g dt, and the square of it nothing."""
+    [probe] = [one for one in PROBES if one.name == "slow ball"]
+    times = DT * np.arange(1 + probe.rows[1])
+    motion = Trajectory.from_states(times, np.tile(probe.scene.initial_state, (len(times), 1)))
+    assert explain_impact(probe.scene, motion) is None
+    assert next(symptoms(probe, motion)) == "the body does not fall: gravity is missing, or the floor supports it from the first step on"
+
+
+@pytest.mark.parametrize("number", [1, 8], ids=["position", "velocity"])
+def test_constant_error_of_a_state_is_not_one_of_time(number):
+    """In the first row too; `builds what is meant` states it."""
+
+    class Offset(made.ExactSimulation):
+        def _states(self, steps):
+            return super()._states(steps) - 0.05 * np.eye(13)[number]
+
+    engine = type("Shifted", (made.Exact,), {"prepare": lambda self, scene, dt: Offset(scene, dt)})()
+    assert failed(engine, "time") == {}
+    assert " at the start is " in failed(engine, "builds what is meant")["builds what is meant"]
+
+
+def test_damping_is_among_the_causes_of_a_wrong_time():
+    found = failed(fault("damped", change=with_damping(linear=0.5)), "time", "velocity lag")
+    assert found["time"].startswith("a free ball slows down, as with damping, or rows are not uniform in time: ")
+    assert found["velocity lag"].endswith("or the fall is damped")
+
+
+def test_lag_that_drifts_has_no_number():
+    """Steps of at most 5 ms: displacements are half of those that velocity gives."""
+    engine = type("Short", (made.Exact,), {"prepare": lambda self, scene, dt: made.ExactSimulation(scene, min(dt, 0.005))})()
+    assert failed(engine, "velocity lag") == {"velocity lag": NO_LAG}

@@ -5,27 +5,30 @@ neither the motion nor the frames at rest tell them apart.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dropspin.comparisons.logs.flight import (
     ACCELERATION,
-    FEWEST_FRAMES,
     OFFSET,
     accelerations,
     is_near,
+    noise_of,
     positions,
+    standard_error,
     window_size,
 )
 from dropspin.comparisons.logs.flights import Flights, flights_of
 from dropspin.comparisons.logs.log import LENGTHS, TIMES, UPRIGHT, Cause, Finding, Header, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
-from dropspin.comparisons.logs.recorded import of_frames, of_quaternions, of_spins
+from dropspin.comparisons.logs.recorded import of_floor, of_frames, of_quaternions, of_spins
 from dropspin.comparisons.logs.rest import rests
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.errors import DropspinError
@@ -39,6 +42,9 @@ UNIT = 0.05
 """Largest relative difference from the ratio of two units."""
 RATES = (0.5, 2.0)
 """Rates over the true one that are tried."""
+CENTRES = tuple(f"centre of mass, {axis}" for axis in "xyz")
+RATIOS = ("I_x / I_y over the header's", "I_z / I_y over the header's")
+"""Names of values."""
 MOST_LOG = 700.0
 """Logarithm near that of the largest number: intervals that are wider are not determined."""
 OF_SIZE, OF_RATIO, OF_DRAG = 0.1, 0.1, 0.5
@@ -60,6 +66,11 @@ class Value:
     def half_width(self) -> float:
         """The half width of the interval."""
         return 0.5 * (self.high - self.low)
+
+    @property
+    def is_identifiable(self) -> bool:
+        """Whether the flights determine the value."""
+        return not self.half_width > self.useful
 
 
 @dataclass(frozen=True)
@@ -93,8 +104,8 @@ class Check:
 
     @property
     def reads_the_columns_right(self) -> bool:
-        """Whether the header states units, axes and quaternions correctly; an error of the scale is ignored."""
-        return not any(finding.kind in ("up", "unit", "quaternion") for finding in self.findings)
+        """Whether the header states units, axes, quaternions and the floor correctly; an error of the scale is ignored."""
+        return not any(finding.kind in ("up", "unit", "quaternion", "floor") for finding in self.findings)
 
 
 def log_check(recording: Flights | Log | str | Path) -> Check:
@@ -112,18 +123,21 @@ def log_check(recording: Flights | Log | str | Path) -> Check:
     flights = recording if isinstance(recording, Flights) else _flights(recording if isinstance(recording, Log) else load_log(recording))
     drag = regression([positions(flight, with_drag=True) for flight in flights.found])
     found = [*_of_units(flights), *of_quaternions(flights.log, flights), *of_spins(flights), *of_frames(flights)]
-    check = Check(tuple(_values(flights, drag)), tuple(found), tuple(_tosses(flights)), flights)
+    values = tuple(_values(flights, drag))
+    check = Check(values, tuple(found), tuple(_tosses(flights)), flights)
     if not check.reads_the_columns_right:
         return check
-    return replace(check, findings=(*found, *_of_scale(flights), *_of_offset(flights), *_of_inertia(flights, drag)))
+    found += [*_of_scale(flights), *_of_offset(flights, values), *_of_inertia(flights, drag, values), *of_floor(flights, ALARM)]
+    return replace(check, findings=tuple(found))
 
 
 def _flights(log: Log) -> Flights:
     """The flights of a recording, of whatever acceleration."""
     flights = flights_of(log, _acceleration(log, np.array([0.0, -log.header.gravity, 0.0])))
     if flights is None:
+        needed = max(window_size(toss, noise_of(log), np.array([0.0, -log.header.gravity, 0.0])) for toss in log.tosses)
         raise DropspinError(
-            f"{log.origin}: no toss has {FEWEST_FRAMES} frames of free flight with one acceleration; film from the release on, and give "
+            f"{log.origin}: no toss has {needed} frames of free flight with one acceleration; film from the release on, and give "
             "the rate of the frames."
         )
     return flights
@@ -131,17 +145,24 @@ def _flights(log: Log) -> Flights:
 
 def _acceleration(log: Log, down: Array) -> Array:
     """The free acceleration: the header's, if most tosses fall with it, else that of other units and axes that most tosses fall with."""
-    pieces = [accelerations(toss, window_size(toss)) for toss in log.tosses if len(toss) >= window_size(toss)]
+    noise, offset = noise_of(log), log.header.tracked_from_centre
+
+    @cache
+    def pieces(number: int, size: int) -> Array:
+        return accelerations(log.tosses[number], size, offset)
 
     def falling(acceleration: Array) -> int:
-        return sum(bool(is_near(of_toss, acceleration).any()) for of_toss in pieces)
+        sizes = [window_size(toss, noise, acceleration) for toss in log.tosses]
+        errors = [standard_error(toss, size, noise) for toss, size in zip(log.tosses, sizes, strict=True)]
+        near = (is_near(pieces(*of_toss), acceleration, error) for of_toss, error in zip(enumerate(sizes), errors, strict=True))
+        return sum(bool(of_toss.any()) for of_toss in near)
 
     if 2 * falling(down) > len(log.tosses):
         return down
     lengths, times = ({a / b for a, b in product(units.values(), repeat=2)} for units in (LENGTHS, TIMES))
     factors = lengths | {ratio**2 for ratio in (*times, *RATES)}
     candidates = [factor * sign * np.roll(down, turn) for factor in sorted(factors) for turn in range(3) for sign in (1.0, -1.0)]
-    candidates += [of_toss[0] for of_toss in pieces]
+    candidates += [first for number, toss in enumerate(log.tosses) for first in pieces(number, window_size(toss, noise, down))[:1]]
     return max([down, *candidates], key=falling)
 
 
@@ -193,10 +214,16 @@ def _shown(*causes: tuple[Cause, bool]) -> tuple[Cause, ...]:
     return tuple(cause for cause, is_shown in causes if is_shown) or tuple(cause for cause, _ in causes)
 
 
-def _of_offset(flights: Flights) -> Iterator[Finding]:
-    """Of a centre of mass that is not where the header says."""
+def _known(values: Sequence[Value], names: Sequence[str]) -> NDArray[np.bool_]:
+    """Whether each of the named values is identifiable."""
+    known = {value.name: value.is_identifiable for value in values}
+    return np.array([known[name] for name in names])
+
+
+def _of_offset(flights: Flights, values: Sequence[Value]) -> Iterator[Finding]:
+    """Of a centre of mass that is not where the header says, along the axes along which it is identifiable."""
     header, found = flights.log.header, flights.moving
-    off = header.tracked_from_centre - found.values[OFFSET]
+    off = np.where(_known(values, CENTRES), header.tracked_from_centre - found.values[OFFSET], 0.0)
     is_off = np.abs(off) > found.half_widths(ALARM)[OFFSET]
     if is_off.any():
         _, _, moved, error = rests(flights.log).scale()
@@ -220,15 +247,16 @@ def _moments(inertia: Array) -> list[Any]:
     return list((np.diag(inertia) if is_diagonal(inertia) else inertia).tolist())
 
 
-def _of_inertia(flights: Flights, drag: Regression) -> Iterator[Finding]:
-    """Of ratios of moments of inertia that differ from the header's, and of drag."""
+def _of_inertia(flights: Flights, drag: Regression, values: Sequence[Value]) -> Iterator[Finding]:
+    """Of ratios of moments of inertia that differ from the header's, and of drag, as far as they are identifiable."""
     found, body = flights.turning, flights.log.header.body
-    stretched = np.exp(0.5 * np.array([found.values[0], 0.0, found.values[1]]))
+    ratios = np.where(_known(values, RATIOS), found.values, 0.0)
+    stretched = np.exp(0.5 * np.array([ratios[0], 0.0, ratios[1]]))
     keys = {"body.inertia": _moments(body.inertia_tensor * np.outer(stretched, stretched))}
-    for kind, value, wide in zip(("inertia, x", "inertia, z"), found.values, found.half_widths(ALARM), strict=True):
+    for kind, value, wide in zip(("inertia, x", "inertia, z"), ratios, found.half_widths(ALARM), strict=True):
         if abs(value) > max(wide, 0.01):
             yield Finding(kind, math.exp(value), 1.0, causes=(Cause("moments of inertia", keys=keys),))
-    if drag.values[-1] > drag.half_widths(ALARM)[-1]:
+    if _known(values, ["drag"]).all() and drag.values[-1] > drag.half_widths(ALARM)[-1]:
         yield Finding("drag", float(drag.values[-1]), 0.0)
 
 
@@ -240,12 +268,13 @@ def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
     yield Value("gravity", fall, fall - error, fall + error, "m/s²")
     yield Value("length scale", fall / header.gravity, (fall - error) / header.gravity, (fall + error) / header.gravity, "")
     centres = np.asarray(header.tracked_point) - found.values[OFFSET]
-    for axis, centre, error in zip("xyz", centres, wide[OFFSET], strict=True):
-        yield Value(f"centre of mass, {axis}", centre, centre - error, centre + error, "m", OF_SIZE * header.body.size)
+    widths = np.where(flights.show_offset, wide[OFFSET], np.inf)
+    for name, centre, error in zip(CENTRES, centres, widths, strict=True):
+        yield Value(name, centre, centre - error, centre + error, "m", OF_SIZE * header.body.size)
     turning = flights.turning
-    for name, value, error in zip(("I_x / I_y", "I_z / I_y"), turning.values, turning.half_widths(), strict=True):
-        low, middle, high = (math.exp(min(value + step, MOST_LOG)) for step in (-error, 0.0, error))
-        yield Value(f"{name} over the header's", middle, low, high, "", middle * math.sinh(OF_RATIO))
+    for name, value, error in zip(RATIOS, turning.values, turning.half_widths(), strict=True):
+        low, middle, high = (math.exp(max(min(value + step, MOST_LOG), -MOST_LOG)) for step in (-error, 0.0, error))
+        yield Value(name, middle, low, high, "", middle * math.sinh(OF_RATIO))
     rate, error = drag.values[-1], drag.half_widths()[-1]
     yield Value("drag", rate, rate - error, rate + error, "1/s", OF_DRAG)
     for name, noise, unit in (("position", found.noise, "m"), ("orientation", turning.noise, "rad")):

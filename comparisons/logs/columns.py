@@ -4,7 +4,7 @@ import io
 import json
 import warnings
 import zipfile
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,8 @@ NUMBERS = ("t", *POSITION, *ORIENTATION, *VELOCITY, *SPIN)
 REQUIRED = {*POSITION, *ORIENTATION}
 LARGEST_FILE = 200_000_000  # bytes
 MOST_ROWS = 1_000_000
+SEPARATORS = {";": "semicolons", "\t": "tabs"}
+"""That a table may have instead of commas."""
 LONGEST_NAME = 100
 """Characters of the name of a toss."""
 Columns = dict[str, Any]
@@ -84,8 +86,26 @@ def _verify(given: str, names: Collection[str], rows: int = 0) -> None:
         raise DropspinError(f"{given}: has more than {MOST_ROWS:,} rows, the limit for a recording; give fewer tosses.")
 
 
+def _verify_first_line(given: str, names: Sequence[str]) -> None:
+    """Raise `DropspinError` for names of columns that show another separator, no name, or one name twice."""
+    for sign, word in SEPARATORS.items():
+        if len(names) == 1 and sign in names[0]:
+            raise DropspinError(
+                f"{given}: column {shown(names[0])} is unknown: {word} separate the values; separate them by commas, and write decimals "
+                "with a point."
+            )
+    for number, name in enumerate(names):
+        if not name:
+            where = "the first line ends in a separator; leave it out there and in all rows"
+            raise DropspinError(f"{given}: column {number + 1} has no name{': ' + where if not any(names[number:]) else '; name it'}.")
+        if name in names[:number]:
+            raise DropspinError(f"{given}: column {shown(name)} is there twice; give each column once.")
+
+
 def _csv(raw: bytes, given: str) -> Columns:
-    names = [str(name) for name in pd.read_csv(io.BytesIO(raw), nrows=0, index_col=False, skipinitialspace=True).columns]
+    first = pd.read_csv(io.BytesIO(raw), nrows=1, header=None, skipinitialspace=True, dtype=str, keep_default_na=False)
+    names = list(map(str, first.iloc[0]))
+    _verify_first_line(given, names)
     _verify(given, names)
     options: dict[str, Any] = {"dtype": {TOSS: str}, "low_memory": False}
     with warnings.catch_warnings():

@@ -11,12 +11,15 @@ from scipy.special import stdtrit
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.logs.flights import Flights
-from dropspin.comparisons.logs.grids import FIRST_GRID, Profile, problem_of, profile_of
+from dropspin.comparisons.logs.grids import FIRST_GRID, Problem, Profile, problem_of, profile_of
 from dropspin.comparisons.logs.intervals import LEVEL, expanded
 from dropspin.comparisons.logs.log import Log
 from dropspin.comparisons.logs.replay import flights_in, of_each_engine
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.processes import FIVE_MINUTES, ResourceLimits
+from dropspin.scenarios.ensemble import clearances
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import ORIENTATION, POSITION
 
 ANY_ENGINE = "any engine"
 ENGINES = ("mujoco", "wang[contact=sequential,law=coulomb]")
@@ -24,6 +27,10 @@ FRAMES = 8
 """Frames after the last one of the flight."""
 EQUAL = 0.02
 """Difference of a parameter between engines that may be neglected: in a restitution of 0.4, it changes a rebound's height by a tenth."""
+
+
+NEAR_FLOOR = 0.1
+"""Height of the lowest point, over the size of the body, below which a frame may be one of a contact, which may be between two frames."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +93,7 @@ class LogFit:
         discrepancies: For each engine, the standard deviation [m] of differences from the recorded poses that neither noise nor errors of
             the initial state explain; with it, 90 % of the tosses are consistent.
         left_out: The engines that have no estimate, with the reason.
+        touches: Whether a body is near the floor of the header in any of these frames.
     """
 
     tosses: int
@@ -95,6 +103,7 @@ class LogFit:
     friction: Estimate | None
     discrepancies: Mapping[str, float]
     left_out: Mapping[str, str]
+    touches: bool = True
 
 
 def log_fit(
@@ -135,7 +144,14 @@ def log_fit(
         if parameter == "friction" and len(identified) > 1:
             friction = _of_all(parameter, identified, size)
     discrepancies = {label: profile.discrepancy for label, profile in profiles.items()}
-    return LogFit(size, frames, tuple(estimates), tuple(transfers), friction, discrepancies, left_out)
+    return LogFit(size, frames, tuple(estimates), tuple(transfers), friction, discrepancies, left_out, _touches(problem))
+
+
+def _touches(problem: Problem) -> bool:
+    """Whether a body is near the floor of the header in any of the frames."""
+    body, poses = problem.header.body, problem.measured.reshape(-1, 7).copy()
+    poses[:, POSITION] -= rotate(poses[:, ORIENTATION], problem.header.tracked_from_centre)
+    return bool(clearances(poses, body.vertices, body.semi_axes).min() < NEAR_FLOOR * body.size)
 
 
 def _estimate(label: str, parameter: str, profile: Profile, size: int) -> Estimate:

@@ -6,6 +6,7 @@ p is the tracked point, at d from the centre of mass in the body frame. Frames a
 predicts it, within the noise that the recording itself shows.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,15 +20,21 @@ from dropspin.scenarios.rotations import length, rotate
 from dropspin.scenarios.state import Array
 
 WINDOW = 0.05
-"""Length of the pieces in which a fall is looked for [s]; at least `FEWEST_FRAMES` frames."""
+"""Length of the pieces in which a fall is looked for [s]; at least `FEWEST_FRAMES` frames, and as many as the noise needs."""
 FEWEST_FRAMES = 6
 """Of a flight; a parabola in three coordinates leaves half of the numbers of six frames."""
 NEAR = 0.25
-"""How far the acceleration of a piece of a fall may be from that of the falls, as a share."""
+"""How far the acceleration of a piece of a fall may be from that of the falls, as a share; farther if the noise needs it."""
+MOST_FRAMES = 1e9
+"""Of a piece: more than a recording has."""
+ERRORS = 4.6
+"""Standard errors by which it may be: χ with 3 degrees of freedom exceeds it once in 10,000."""
+FARTHEST = 0.6
+"""Share to which these may add up; pieces have as many frames as that needs. A body at rest is at 1."""
 SURPRISING = 25.9
 """Squared distance over variance beyond which a frame is not of the flight: χ² with 3 degrees of freedom exceeds it once in 1e5."""
 LONGEST = 200
-"""Frames that a prediction uses, and that the regressions use of a flight, evenly chosen."""
+"""Frames that a prediction uses with its own one, and that the regressions use of a flight, evenly chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,35 +109,68 @@ def falls(log: Log, acceleration: Array) -> list[Flight | None]:
 
     Long is more than half as long as the longest one: later parts are between impacts.
     """
-    return [_fall(toss, window_size(toss), acceleration) for toss in log.tosses]
+    noise, offset = noise_of(log), log.header.tracked_from_centre
+    return [_fall(toss, noise, offset, acceleration) for toss in log.tosses]
 
 
-def _fall(toss: Toss, size: int, acceleration: Array) -> Flight | None:
-    near = is_near(accelerations(toss, size), acceleration) if len(toss) >= size else np.empty(0)
+def _fall(toss: Toss, noise: float, offset: Array, acceleration: Array) -> Flight | None:
+    size = window_size(toss, noise, acceleration)
+    near = is_near(accelerations(toss, size, offset), acceleration, standard_error(toss, size, noise))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
     runs = [Flight(toss, int(first), int(end) + size - 1) for first, end in edges.reshape(-1, 2)]
     longest = max(map(len, runs), default=0)
     return next((run for run in runs if 2 * len(run) > longest), None)
 
 
-def is_near(pieces: Array, acceleration: Array) -> NDArray[np.bool_]:
-    """Whether accelerations of pieces are about a given one [m/s²], shapes (pieces, 3) and (3,)."""
-    return length(pieces - acceleration) < NEAR * length(acceleration)
+def is_near(pieces: Array, acceleration: Array, error: float) -> NDArray[np.bool_]:
+    """Whether accelerations of pieces are about a given one [m/s²], shapes (pieces, 3) and (3,), with their standard error."""
+    return length(pieces - acceleration) < max(NEAR * float(length(acceleration)), ERRORS * error)
 
 
-def window_size(toss: Toss) -> int:
-    """Frames of the pieces in which a fall is looked for."""
-    return max(FEWEST_FRAMES, round(WINDOW / float(np.median(np.diff(toss.t)))))
+def standard_error(toss: Toss, size: int, noise: float) -> float:
+    """Of the acceleration of a parabola through so many frames with a noise of positions [m], about, in m/s²."""
+    return noise * math.sqrt(720.0 / size**5) / float(np.median(np.diff(toss.t))) ** 2
 
 
-def accelerations(toss: Toss, size: int) -> Array:
-    """Of the tracked point in each piece of some frames, by a parabola [m/s²], shape (pieces, 3)."""
-    t = sliding_window_view(toss.t, size)
+def window_size(toss: Toss, noise: float = 0.0, acceleration: Array | None = None) -> int:
+    """Frames of the pieces in which a fall of an acceleration [m/s²], shape (3,), is looked for with a noise of positions [m]."""
+    dt = float(np.median(np.diff(toss.t)))
+    fewest = max(FEWEST_FRAMES, round(WINDOW / dt))
+    if acceleration is None:
+        return fewest
+    allowed = FARTHEST * float(np.linalg.norm(acceleration))
+    ratio = ERRORS * standard_error(toss, 1, noise) / allowed if allowed > 0.0 else math.inf
+    return max(fewest, math.ceil(min(ratio**0.4, MOST_FRAMES)))
+
+
+def noise_of(log: Log) -> float:
+    """The noise of positions [m]: what parabolas leave of the pieces, in the median."""
+    left = []
+    for toss in log.tosses:
+        t, pieces, curved = _pieces(toss, size := window_size(toss), log.header.tracked_from_centre, size)
+        for column in (np.ones_like(t), t, curved):
+            share = np.einsum("wi,wki->wk", column, pieces) / np.sum(column**2, axis=1)[:, np.newaxis]
+            pieces = pieces - share[..., np.newaxis] * column[:, np.newaxis]
+        left.append(np.sum(pieces**2, axis=(1, 2)) / (3 * (size - 3)))
+    return math.sqrt(float(np.median(np.concatenate(left)))) if any(map(len, left)) else 0.0
+
+
+def accelerations(toss: Toss, size: int, offset: Array) -> Array:
+    """Of the centre of mass in each piece of some frames, by a parabola [m/s²], shape (pieces, 3); `offset` is d [m], shape (3,)."""
+    _, pieces, curved = _pieces(toss, size, offset)
+    return 2.0 * np.einsum("wi,wki->wk", curved, pieces) / np.sum(curved**2, axis=1)[:, np.newaxis]
+
+
+def _pieces(toss: Toss, size: int, offset: Array, step: int = 1) -> tuple[Array, Array, Array]:
+    """Of every step-th piece of some frames the times from its middle, the centres of mass, and squares of times less their line."""
+    if len(toss) < size:
+        return np.empty((0, size)), np.empty((0, 3, size)), np.empty((0, size))
+    t = sliding_window_view(toss.t, size)[::step]
     t = t - t.mean(axis=1, keepdims=True)
     curved = t**2 - np.mean(t**2, axis=1, keepdims=True)
     curved -= t * (np.sum(t * curved, axis=1) / np.sum(t * t, axis=1))[:, np.newaxis]
-    pieces = sliding_window_view(toss.position, size, axis=0)
-    return 2.0 * np.einsum("wi,wki->wk", curved, pieces) / np.sum(curved**2, axis=1)[:, np.newaxis]
+    centre = toss.position - rotate(toss.orientation, offset) if offset.any() else toss.position
+    return t, sliding_window_view(centre, size, axis=0)[::step], curved
 
 
 def grown(flight: Flight, found: Regression, weight: float) -> Flight:
@@ -154,7 +194,7 @@ def _end(flight: Flight, shared: Array, noise: Noise) -> int:
 
 def surprise(flight: Flight, frame: int, shared: Array, noise: Noise, delay: float = 0.0) -> float:
     """Squared distance of a later frame from its prediction, over the variance; `delay` is added to its time [s]."""
-    recent = Flight(flight.toss, max(flight.first, flight.end - LONGEST), flight.end)
+    recent = Flight(flight.toss, max(flight.first, flight.end + 1 - LONGEST), flight.end)  # with the later frame, at most LONGEST rows
     toss = recent.toss
     times = np.append(toss.t[recent.first : recent.end], toss.t[frame] + delay)
     rows = np.append(np.arange(recent.first, recent.end), frame)

@@ -1,10 +1,12 @@
 """All flights of a recording: what they share, and the state at the end of each."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dropspin.comparisons.logs.flight import ACCELERATION, Flight, departures, falls, grown, positions
+from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, Flight, departures, falls, grown, positions
 from dropspin.comparisons.logs.log import Header, Log, Toss
 from dropspin.comparisons.logs.noise import Noise, Regression, end_of, regression
 from dropspin.comparisons.logs.rotors import Rotation, rotation, turn_by
@@ -14,6 +16,8 @@ from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Arra
 
 HIGH = 0.01
 """Of the size of the body: how far it gets above the floor in a flight, at least."""
+HIDDEN = 0.1
+"""Component, along an axis, of a direction that flights do not show, from which on they do not show that axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +74,18 @@ class Flights:
     def found(self) -> list[Flight]:
         """The flights without those that are None."""
         return [flight for flight in self.flights if flight is not None]
+
+    @cached_property
+    def show_offset(self) -> NDArray[np.bool_]:
+        """Whether they show d along each axis, shape (3,): not if most of the information is the noise of orientations, as without spin."""
+        whole, noise = self.moving.information.sum(axis=0), self.moving.noise
+        along = whole[OFFSET, ACCELERATION]
+        own = whole[OFFSET, OFFSET] - along @ np.linalg.solve(whole[ACCELERATION, ACCELERATION], along.T)
+        values = sum(weight * rotor.samples.freedom for weight, rotor in zip(self.moving.weights, self.rotations, strict=True))
+        # White noise of a rotation vector moves each coordinate of a body axis by 2/3 of its variance, in the mean over orientations.
+        by_noise = 2.0 / 3.0 * (self.turning.noise.white / noise.white) ** 2 * values
+        sizes, axes = np.linalg.eigh(own)
+        return np.linalg.norm(axes[:, sizes < 2.0 * by_noise], axis=1) < HIDDEN
 
     def starts(self) -> list[Start]:
         """The state at the end of each flight, by the header's gravity and centre of mass."""

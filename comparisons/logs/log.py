@@ -220,7 +220,8 @@ def _toss(where: str, header: Header, name: str, columns: dict[str, Array], rows
 
     t = columns["t"][rows] * TIMES[header.time_unit] if "t" in columns else np.arange(len(rows)) / (header.rate or 1.0)
     for problem in problems_of_order(t):
-        raise DropspinError(f"{where}: toss {name}: {problem}.")
+        row = f" (row {rows[1 + np.argmin(np.diff(t) > 0.0)] + 1})" if len(t) > 1 else ""
+        raise DropspinError(f"{where}: toss {name}: {problem}{row}.")
     quaternions = of(ORIENTATION)
     lengths = length(quaternions)
     if (off := np.abs(lengths - 1.0) > NEAR_UNIT).any():

@@ -131,15 +131,21 @@ class Regression:
         """Of intervals that θ is outside of with a probability, shape (m,): quantiles of Student's t.
 
         Its degrees of freedom are the number of flights minus 1; with few flights, the number of values minus that of the parameters.
+        The interval of a parameter that the flights do not determine is infinite.
         """
         from scipy.special import stdtrit
 
         freedom = len(self.weights) - 1 if len(self.weights) >= FEWEST else self.freedom
-        return float(stdtrit(freedom, 1.0 - outside / 2.0)) * np.sqrt(np.diag(self.covariance))
+        widths = float(stdtrit(freedom, 1.0 - outside / 2.0)) * np.sqrt(np.diag(self.covariance))
+        whole = self.information.sum(axis=0)
+        determined = np.diag(np.linalg.pinv(whole, hermitian=True) @ whole)  # of a projection: 1 if so
+        return np.where(determined > DETERMINED, widths, np.inf)
 
 
 ROUNDING = 8.0 * float(np.finfo(float).eps)
 """Smallest noise, as a share of the largest value: sums and products of a few terms."""
+DETERMINED = 0.99
+"""Share of a parameter's direction that the flights determine, from which on they determine the parameter."""
 FEWEST = 5
 """Flights from which on their differences give the interval; with fewer, the noise does."""
 

@@ -1,14 +1,16 @@
-"""Findings about how a motion was recorded: the order of its quaternions, the frame of its spins, missing and repeated frames."""
+"""Findings about how a motion was recorded: order of quaternions, frame of spins, missing and repeated frames, height of the floor."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.logs.flight import FEWEST_FRAMES, SURPRISING, surprise
+from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, SURPRISING, Flight, noise_of, surprise, window_size
 from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.log import UPRIGHT, Cause, Finding, Header, Log, Toss
-from dropspin.comparisons.logs.rest import level_share
+from dropspin.comparisons.logs.noise import Noise
+from dropspin.comparisons.logs.rest import level_share, rests
 from dropspin.comparisons.logs.rotors import rotation
 from dropspin.comparisons.running.belonging import missing_frames
 from dropspin.scenarios.rotations import conjugate, length, multiply, rotate, unrotate
@@ -16,6 +18,8 @@ from dropspin.scenarios.state import Array
 
 MOST_ROTORS = 8
 """Flights whose rotation is tried in other readings."""
+RESTS_NEAR = 0.04
+"""Of the size of the body: how far above or below the floor it may rest, by errors of its own size and of tags."""
 DEGREE, BETTER = 5, 1.02
 """Degree of the polynomials that compare times with equal steps. Uneven times are right unless equal steps fit by this factor better."""
 
@@ -100,16 +104,44 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
         times_are_right = _residual(flights, equal_steps=False) <= BETTER * _residual(flights, equal_steps=True)
         irregularities = tuple(finding for finding in irregularities if finding.kind != "jitter" or not times_are_right)
     yield from irregularities
+    noise = noise_of(flights.log)
     for toss, flight in zip(flights.log.tosses, flights.flights, strict=True):
         if flight is None:
-            yield Finding("no flight", 0.0, FEWEST_FRAMES, toss.name)
+            yield Finding("no flight", 0.0, window_size(toss, noise, flights.moving.values[ACCELERATION]), toss.name)
     for flight, weight in zip(flights.found, flights.moving.weights, strict=True):
-        own, dt = flights.moving.noise.of_weight(min(weight, 1.0)), float(np.median(np.diff(flight.toss.t)))
-        # The last frame of a flight was left out before an impact; the frame after it is the first one that is not of the flight.
-        frames = range(flight.end + 1, min(flight.end + 4, len(flight.toss)))
-        for missing in (1, 2, 3):
-            if len(frames) == 3 and all(surprise(flight, frame, flights.moving.values, own, missing * dt) < SURPRISING for frame in frames):
-                yield Finding("frame dropped", missing, 0.0, flight.toss.name, flight.end + 1)
-                break
-        if flight.first > 2:
+        own = flights.moving.noise.of_weight(min(weight, 1.0))
+        after, before = (_dropped(part, flights.moving.values, own) for part in (flight, flight.backwards()))
+        if before:
+            yield Finding("frame dropped", before, 0.0, flight.toss.name, flight.first - 1)
+        elif flight.first > 2:
             yield Finding("late", flight.first, 0.0, flight.toss.name, flight.first, (Cause("held"), Cause("earlier impact")))
+        if after:
+            yield Finding("frame dropped", after, 0.0, flight.toss.name, flight.end + 1)
+
+
+def _dropped(flight: Flight, shared: Array, noise: Noise) -> int:
+    """How many frames are missing at the end of a flight: the number by which the next frames are of it if they are later; 0 if none."""
+    dt = float(np.median(np.diff(flight.toss.t)))
+    # The last frame of a flight was left out before an impact; the frame after it is the first one that is not of the flight.
+    frames = range(flight.end + 1, min(flight.end + 4, len(flight.toss)))
+    for missing in (1, 2, 3):
+        if len(frames) == 3 and all(surprise(flight, frame, shared, noise, missing * dt) < SURPRISING for frame in frames):
+            return missing
+    return 0
+
+
+def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:
+    """Of bodies that rest above the floor or below it by more than errors of the scale and of the tracked point explain.
+
+    `alarm` is the probability with which these errors may be larger.
+    """
+    header, found, resting = flights.log.header, flights.moving, rests(flights.log)
+    above, error = resting.above()
+    if header.floor is None or not flights.show_offset.all() or not math.isfinite(above):
+        return
+    wide, off = found.half_widths(alarm), header.tracked_from_centre - found.values[OFFSET]
+    by_scale = (abs(found.values[1] / header.gravity + 1.0) + wide[1] / header.gravity) * float(np.mean(resting.expected))
+    by_point = float(np.linalg.norm(np.abs(off) + wide[OFFSET]))
+    if abs(above) > 4.0 * error + by_scale + by_point + RESTS_NEAR * header.body.size:
+        height = round(header.floor_height + above, 4)
+        yield Finding("floor", above, 0.0, causes=(Cause("floor", keys={"floor_height": height}),))

@@ -50,6 +50,13 @@ class Rests(NamedTuple):
         errors[seen] = np.sqrt(float(left @ left) / (len(left) - len(seen)) * np.diag(np.linalg.inv(columns.T @ columns)))
         return float(values[0]), float(errors[0]), values[1:], errors[1:]
 
+    def above(self) -> tuple[float, float]:
+        """The median height of the lowest points above the floor [m], and its standard error; NaN with fewer than `FEWEST_RESTS`."""
+        above = self.heights - self.expected
+        if len(above) < FEWEST_RESTS:
+            return np.nan, np.nan
+        return float(np.median(above)), float(np.std(above, ddof=1) / np.sqrt(len(above)))
+
 
 def rests(log: Log) -> Rests:
     """The tosses of a recording whose last frames do not move."""

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from dropspin.comparisons.logs.check import Check, TossFacts, Value
+from dropspin.comparisons.logs.check import CENTRES, RATIOS, Check, TossFacts, Value
 from dropspin.comparisons.logs.log import Finding
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
@@ -23,9 +23,10 @@ DIGITS = 2
 MOST_ALIKE = 3
 """Largest number of findings of one kind that a terminal shows."""
 SPINNING = "tosses of 0.3 s that spin at 8 rad/s or more, about different axes"
-NEEDS = {f"centre of mass, {axis}": "about {tosses} tosses like these, or a faster spin" for axis in "xyz"}
-NEEDS |= {"I_x / I_y over the header's": SPINNING, "I_z / I_y over the header's": SPINNING, "drag": "longer flights"}
+NEEDS = dict.fromkeys(RATIOS, SPINNING) | {"drag": "longer flights"}
 """What a recording needs for a value to be identifiable, by the name of the value."""
+MOST_RATIO = 10.0
+"""Times the useful half width from which on more tosses are no advice: a hundred times as many."""
 
 
 class CheckedLog(Study):
@@ -75,10 +76,13 @@ class CheckedLog(Study):
 
     def _note(self, value: Value) -> str | None:
         """What the recording needs for a value to be identifiable; None if the value is identifiable."""
-        if not value.half_width > value.useful:
+        if value.is_identifiable:
             return None
-        flights = sum(toss.frames > 0 for toss in self.tosses)
-        return NEEDS[value.name].format(tosses=math.ceil(flights * (value.half_width / value.useful) ** 2))
+        if value.name not in CENTRES:
+            return NEEDS[value.name]
+        ratio, flights = value.half_width / value.useful, sum(toss.frames > 0 for toss in self.tosses)
+        more = f"about {math.ceil(flights * ratio**2)} tosses like these, or " if ratio < MOST_RATIO else ""
+        return f"{more}a faster spin"
 
 
 def _row(value: Value, note: str | None) -> dict[str, str]:

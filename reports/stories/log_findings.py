@@ -18,6 +18,7 @@ KINDS = {
     "drag": "the speed decays at a rate of {value:.2g} 1/s",
     "quaternion": "the quaternions have another order than the header says, or describe the inverse rotation",
     "spin": "the recorded angular velocity differs by {percent:.0f} % from that of the quaternions",
+    "floor": "bodies at rest are {mm_off:.4g} mm {side} the floor of the header",
     "no flight": "toss {toss}: no free flight of at least {expected:.0f} frames",
     "frame dropped": "toss {toss}: number of frames missing before frame {frame}: {value:.0f}",
     "late": "toss {toss}: the free flight begins only at frame {frame}",
@@ -52,7 +53,7 @@ LESS_OR_MORE = {
 REMEDIES = {
     "drag": "engines simulate no air; shorter falls or a denser body reduce the effect of drag",
     "no flight": "begin the recording when the body is released",
-    "frame dropped": "give the times in a column t",
+    "frame dropped": "give the exact time of each frame in a column t",
     "repeated": "leave out rows that were not measured",
     "jitter": "give the exact time of each frame; or, if the frames are evenly spaced, leave out the column t and give rate in the header",
     "rate": "multiply the times t by {ratio:.4g}",
@@ -101,7 +102,8 @@ def remedy(finding: Finding) -> str:
 def _values(finding: Finding) -> dict[str, Any]:
     """The columns of a finding, with its numbers in other units."""
     value, expected = finding.value, finding.expected
-    numbers = {"mm": 1e3 * value, "ms": 1e3 * value, "expected_ms": 1e3 * expected, "rests_mm": 1e3 * finding.rests}
+    numbers: dict[str, Any] = {"mm": 1e3 * value, "ms": 1e3 * value, "expected_ms": 1e3 * expected, "rests_mm": 1e3 * finding.rests}
+    numbers |= {"mm_off": abs(1e3 * value), "side": "below" if value < 0.0 else "above"}
     numbers |= {"degrees": math.degrees(value), "percent": 100.0 * value, "expected_percent": 100.0 * expected}
     return vars(finding) | numbers
 

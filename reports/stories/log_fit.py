@@ -28,6 +28,8 @@ NOT_IDENTIFIED: Mapping[str, str] = {
     "friction": "no toss slides, or the engine does not use friction; tosses that strike the floor at a flat angle would bound it",
     "restitution": "the motions do not depend on restitution, or the engine does not use it",
 }
+UNTOUCHED = "no body touches the floor of the header in these frames; correct floor_height, or give more frames (--frames)"
+"""Why neither parameter is identified then."""
 
 
 class FittedLog(Study):
@@ -62,8 +64,9 @@ class FittedLog(Study):
             legend += (
                 " The interval of an engine holds for this engine only; the interval of 'any engine' includes differences between engines."
             )
+        reasons = NOT_IDENTIFIED if fit.touches else dict.fromkeys(NOT_IDENTIFIED, UNTOUCHED)
         unknown = [
-            f"{row.parameter.capitalize()} is not identified with {row.engine}: {NOT_IDENTIFIED[row.parameter]}."
+            f"{row.parameter.capitalize()} is not identified with {row.engine}: {reasons[row.parameter]}."
             for row in fit.estimates
             if not row.has_lower and not row.has_upper
         ]

@@ -6,10 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.tosses import BRICK, CUBE, made
+from support.tosses import BRICK, CUBE, made, turned
 
-from dropspin.comparisons.logs.check import Check, log_check
+from dropspin.comparisons.logs import check as checks
+from dropspin.comparisons.logs.check import CENTRES, RATIOS, Check, log_check
+from dropspin.comparisons.logs.flights import flights_of
 from dropspin.comparisons.logs.log import Finding, Log, Toss, load_log
+from dropspin.comparisons.logs.noise import Noise, Regression
+from dropspin.comparisons.logs.recorded import of_frames
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
 
@@ -163,7 +167,59 @@ def test_the_shipped_cube_has_short_lengths_and_an_eccentric_mass() -> None:
     assert list(cure(kinds["centre of mass"])) == ["body.center_of_mass"]
 
 
+def test_a_recording_with_short_flights_says_how_many_frames_are_needed() -> None:
+    # At 240 frames per second, 12 frames take 50 ms.
+    log = made(1, 2, rate=240.0).log
+    short = [replace(toss, t=toss.t[:8], position=toss.position[:8], orientation=toss.orientation[:8]) for toss in log.tosses]
+    with pytest.raises(DropspinError, match="no toss has 12 frames of free flight"):
+        log_check(replace(log, tosses=tuple(short)))
+    flights = flights_of(replace(log, tosses=(*log.tosses, replace(short[0], name="short"))), np.array([0.0, -9.81, 0.0]))
+    assert flights is not None
+    [found] = [finding for finding in of_frames(flights) if finding.kind == "no flight"]
+    assert (found.toss, found.expected) == ("short", 12)
+
+
 def test_a_recording_without_free_flight_is_refused() -> None:
     still = changed(sound(count=2), position=lambda toss: 0.0 * toss.position)
     with pytest.raises(DropspinError, match="free flight"):
         log_check(still)
+
+
+def flying(log: Log, orientation: Callable[[Toss], Any]) -> Log:
+    """The first 15 frames of each toss, all of its flight, with other orientations."""
+    tosses = [replace(toss, t=toss.t[:15], position=toss.position[:15], orientation=orientation(toss)[:15]) for toss in log.tosses]
+    return replace(log, tosses=tuple(tosses))
+
+
+@pytest.mark.parametrize("noise", [(2e-4, 2e-2), (0.0, 0.0)])
+def test_bodies_that_do_not_spin_show_neither_their_centre_nor_their_inertia(noise: tuple[float, float]) -> None:
+    # Positions depend on the centre of mass only by a constant; the noise of orientations does not move them.
+    check = log_check(flying(made(1, 2, noise, spin=0.0).log, lambda toss: toss.orientation))
+    assert {value.name for value in check.values if not value.is_identifiable} >= {*CENTRES, *RATIOS}
+    assert check.findings == ()
+
+
+def test_bodies_that_all_spin_about_one_axis_do_not_show_their_centre_along_it() -> None:
+    axis, upright = np.array([0.6, 0.0, 0.8]), np.array([0.0, 0.0, 0.0, 1.0])
+    noise = np.random.default_rng(3)
+
+    def spun(toss: Toss) -> Any:
+        return turned(20.0 * np.outer(toss.t, axis) + 2e-3 * noise.normal(size=(len(toss), 3)), np.tile(upright, (len(toss), 1)))
+
+    flights = flights_of(flying(made(2, 3, NOISE, spin=0.0).log, spun), np.array([0.0, -9.81, 0.0]))
+    assert flights is not None
+    assert flights.show_offset.tolist() == [False, True, False]
+
+
+def test_what_is_not_identifiable_gives_neither_a_finding_nor_a_remedy() -> None:
+    flights = flights_of(made(3, 2, NOISE).log, np.array([0.0, -9.81, 0.0]))
+    assert flights is not None
+    # By one regression, I_x / I_y has an interval of ± 0.12, I_z / I_y one of ± 0.02.
+    information = np.diag([0.06**-2, 0.01**-2])
+    turning = Regression(np.array([-0.5, -0.4]), Noise(1e-3, 0.0), np.ones(1), information[np.newaxis], np.zeros((1, 2)), 1000)
+    skewed = replace(flights, turning=turning)
+    values = tuple(checks._values(skewed, flights.moving))
+    [found] = checks._of_inertia(skewed, flights.moving, values)
+    assert found.kind == "inertia, z"
+    before, after = np.array(flights.log.header.body.moments), np.array(cure(found)["body.inertia"])
+    np.testing.assert_allclose(after / before, [1.0, 1.0, np.exp(-0.4)])

@@ -7,7 +7,7 @@ from support.log_fits import WANG, tosses
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.logs import fit as log_fits
 from dropspin.comparisons.logs.fit import log_fit
-from dropspin.comparisons.logs.grids import Profile
+from dropspin.comparisons.logs.grids import Profile, problem_of
 from dropspin.comparisons.logs.grids import _refined as refined_grid
 from dropspin.scenarios.variations import with_values
 
@@ -104,6 +104,11 @@ def test_grid_around_estimates_at_the_end_of_the_first_grid_has_all_of_its_value
     assert len(found) == 5
     assert 0.0 <= found[0] < found[-1] <= 1.0
     assert end in found
+
+
+@pytest.mark.parametrize(("height", "touches"), [(0.0, True), (0.3, False)])
+def test_frames_in_which_no_body_is_near_the_floor_are_known(height, touches):
+    assert log_fits._touches(problem_of(tosses(np.random.default_rng(4), 8, WANG, 0.3, 0.3, height=height), 8)) is touches
 
 
 @pytest.mark.extended

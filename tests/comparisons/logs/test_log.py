@@ -178,7 +178,15 @@ WRONG = {
     "missing column": (changed(qw=None), "toss.csv: has no column qw; it has t, x, y, z, qx, qy, qz"),
     "part of a velocity": (changed(vx=T), "has no column vy, vz"),
     "unknown column": (changed(time=T), "column 'time' is unknown. Allowed: t, x, y, z"),
-    "semicolons": ({";".join(POSE): T}, "column 't;x;y;z;qx;qy;qz;qw' is unknown"),
+    "semicolons": ({";".join(POSE): T}, "column 't;x;y;z;qx;qy;qz;qw' is unknown: semicolons separate the values; separate them by commas"),
+    "tabs": ({"\t".join(POSE): T}, "is unknown: tabs separate the values; separate them by commas"),
+    "no name": (changed(t=None) | {"": T}, "toss.csv: column 8 has no name: the first line ends in a separator; leave it out there"),
+    "no name within": ({"": T} | POSE, "toss.csv: column 1 has no name; name it"),
+    "a name twice": ({" x": T} | POSE, "toss.csv: column 'x' is there twice; give each column once"),
+    "times that look equal": (
+        with_times(lambda t: t.__setitem__(5, t[4] - 1e-9)),
+        "0.04 s is after 0.04 s; give the states in the order of time (row 6)",
+    ),
 }
 
 

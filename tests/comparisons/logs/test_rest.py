@@ -1,14 +1,19 @@
 """Heights at rest of bodies that are put on known faces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from support.tosses import BRICK
+from support.tosses import BRICK, made
 
+from dropspin.comparisons.logs.flights import flights_of
 from dropspin.comparisons.logs.log import Header, Log, Toss
+from dropspin.comparisons.logs.recorded import of_floor
 from dropspin.comparisons.logs.rest import Rests, level_share, rests
 from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import Array
 
+FLOOR = {"restitution": 0.3, "friction": 0.3}
 QUARTER = np.asarray(np.pi / 2)
 FACES = {  # orientations in which an axis of the body is up or down, and the half extent along it [m]
     (0, 1): (about(np.array([0.0, 0.0, 1.0]), QUARTER), 0.04),
@@ -58,3 +63,28 @@ def test_an_axis_of_which_one_face_was_seen_says_nothing_about_the_point() -> No
 def test_bodies_on_faces_are_level_and_those_on_edges_are_not() -> None:
     assert level_share(resting(1.0, np.zeros(3))) == (1.0, 6)
     assert level_share(resting(1.0, np.zeros(3), tilt=0.3)) == (0.0, 6)
+
+
+def test_a_floor_at_another_height_is_named_with_the_height_that_fits() -> None:
+    flights = flights_of(made(3, 2, (2e-4, 2e-3), spin=8.0).log, np.array([0.0, -9.81, 0.0]))
+    assert flights is not None
+
+    def keys(above: float, floor: dict[str, float] | None = FLOOR, scale: float = 1.0) -> list[dict[str, float]]:
+        log = resting(scale, np.zeros(3))
+        tosses = tuple(replace(toss, position=np.add(toss.position, [0.0, above, 0.0])) for toss in log.tosses)
+        header = Header.model_validate({**log.header.model_dump(), "floor_height": 0.1, "floor": floor})
+        found = of_floor(replace(flights, log=replace(log, header=header, tosses=tosses)), 1e-4)
+        return [dict(finding.causes[0].keys) for finding in found]
+
+    assert keys(0.35) == [{"floor_height": 0.45}]
+    assert keys(-0.25) == [{"floor_height": -0.15}]
+    assert keys(0.001) == keys(0.0, scale=0.98) == keys(0.35, floor=None) == []
+
+
+def test_height_above_the_floor_needs_several_rests() -> None:
+    found = rests(resting(1.0, np.array([0.001, -0.002, 0.003])))
+    above, error = found.above()
+    # On both faces of each axis, δ cancels; its standard deviation is that of ±1, ±2, ±3 mm.
+    assert above == pytest.approx(0.0, abs=1.1e-3)
+    assert error == pytest.approx(1e-3 * np.sqrt(28.0 / 5.0 / 6.0), rel=1e-9)
+    assert np.isnan(Rests(*(part[:5] for part in found)).above()).all()

@@ -11,9 +11,13 @@ import tomlkit
 from support.cli import TERMINAL, assert_refused, dropspin
 from support.tosses import BRICK, made
 
-from dropspin.comparisons.logs.log import Finding, load_log
+from dropspin.comparisons.logs.check import TossFacts, Value
+from dropspin.comparisons.logs.fit import Estimate, LogFit
+from dropspin.comparisons.logs.log import Cause, Finding, load_log
 from dropspin.comparisons.logs.replay import flights_in
-from dropspin.reports.stories.log_check import CheckedLog
+from dropspin.reports.stories.log_check import SPINNING, CheckedLog
+from dropspin.reports.stories.log_findings import sentence
+from dropspin.reports.stories.log_fit import FittedLog
 from dropspin.reports.study_files import read_study
 from dropspin.scenarios import load
 
@@ -130,6 +134,43 @@ def test_many_findings_of_one_kind_are_shortened_on_a_terminal_alone():
     texts = [list(part.items) for part in study.document().parts if part.kind == "sentences"]
     assert [len(items) for items in texts] == [5, 4]
     assert texts[1][-1] == "2 more findings of this kind (gap)."
+
+
+@pytest.mark.parametrize(("half_width", "needs"), [(0.03, "about 90 tosses like these, or a faster spin"), (np.inf, "a faster spin")])
+def test_value_that_no_toss_determines_says_what_it_needs(half_width, needs):
+    values = [
+        Value("centre of mass, x", 0.0, -half_width, half_width, "m", 0.01),
+        Value("I_x / I_y over the header's", 1e-304, 0.0, 1e304, "", 1e-305),
+    ]
+    study = CheckedLog(recording="r", values=values, findings=[], tosses=[TossFacts(str(number), 0, 9, 1.0) for number in range(10)])
+    [table] = [part for part in study.document().parts if part.kind == "table"]
+    assert [row["value"] for row in table.rows] == ["not identifiable"] * 2
+    assert [row["95 % interval"] for row in table.rows] == [f"needs {needs}", f"needs {SPINNING}"]
+
+
+@pytest.mark.parametrize(("touches", "reason"), [(True, "no toss slides"), (False, "no body touches the floor of the header")])
+def test_parameter_without_contact_is_not_identified_because_of_the_floor(touches, reason):
+    unknown = [Estimate("wang", name, 0.5, 0.0, 1.0, False, False) for name in ("friction", "restitution")]
+    fit = LogFit(8, 8, tuple(unknown), (), None, {"wang": 0.05}, {}, touches)
+    [sentences] = [part.items for part in FittedLog(recording="r", findings=[], fit=fit).document().parts if part.kind == "sentences"]
+    assert reason in next(sentence for sentence in sentences if sentence.startswith("Friction is not identified with wang: "))
+
+
+@pytest.mark.parametrize(
+    ("finding", "text"),
+    [
+        (
+            Finding("floor", -0.35, 0.0, causes=(Cause("floor", keys={"floor_height": -0.25}),)),
+            "Bodies at rest are 350 mm below the floor of the header. Remedy: floor_height = -0.25.",
+        ),
+        (
+            Finding("frame dropped", 1.0, 0.0, "2", 15),
+            "Toss 2: number of frames missing before frame 15: 1. Remedy: give the exact time of each frame in a column t.",
+        ),
+    ],
+)
+def test_sentence_on_a_finding(finding, text):
+    assert sentence(finding) == text
 
 
 def test_help_of_log_lists_its_commands(tmp_path):

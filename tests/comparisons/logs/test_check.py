@@ -191,6 +191,7 @@ def flying(log: Log, orientation: Callable[[Toss], Any]) -> Log:
     return replace(log, tosses=tuple(tosses))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("noise", [(2e-4, 2e-2), (0.0, 0.0)])
 def test_bodies_that_do_not_spin_show_neither_their_centre_nor_their_inertia(noise: tuple[float, float]) -> None:
     # Positions depend on the centre of mass only by a constant; the noise of orientations does not move them.

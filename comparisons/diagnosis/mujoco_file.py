@@ -32,6 +32,8 @@ OPTIONS = [name for name in dir(mujoco.MjSpec().option) if not name.startswith("
 MOST_NAMES, MOST_KEYS = 20, 3
 TURNED = 1e-6
 """Difference of |cos(angle / 2)| from 1 up to which two orientations are the same."""
+LEAST = 2e-15
+"""Just above the smallest mass [kg] and moment [kg m²] that MuJoCo accepts: those of bodies of which a file says nothing."""
 ADDED = "a plane with default settings"
 """The surface of a file that has none."""
 
@@ -85,7 +87,7 @@ class MuJoCoFile:
     def unchanged(self) -> Any:
         """The model with the masses and inertias that the file has, before the compiler changes them; impossible ones are balanced."""
         spec = self._spec.copy()
-        spec.compiler.boundmass, spec.compiler.boundinertia, spec.compiler.settotalmass = 0.0, 0.0, -1.0
+        spec.compiler.boundmass, spec.compiler.boundinertia, spec.compiler.settotalmass = LEAST, LEAST, -1.0
         spec.compiler.balanceinertia, spec.compiler.inertiafromgeom = True, mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
         with quiet():
             return spec.compile()

@@ -85,6 +85,13 @@ def test_mass_and_inertia_that_the_compiler_changes_are_said(tmp_path):
     assert impossible(body) == []
 
 
+def test_bodies_without_mass_may_stand_beside_one_whose_mass_is_kept(tmp_path):
+    world = FREE.format(BOX) + '<body name="bare"><joint type="hinge"/></body>'
+    body = body_of(tmp_path, world, head='<compiler boundmass=".001" boundinertia=".0001"/>', name="b")
+    assert body.facts.ignored == []
+    assert body.facts.written.mass == pytest.approx(1.0)
+
+
 def test_damping_by_the_cube_of_the_speed(tmp_path):
     first, second, third = damping = (0.1, 0.2, 0.05)
     world = f'<body name="b" pos="0 0 1"><joint type="free" damping="{numbers(damping)}"/>{BOX}</body>'

@@ -46,8 +46,10 @@ def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | Non
             return
         off = np.zeros(3) if solid is None else solid.centre - given.centre
         if off.any() and _excess(points - off, squares) <= ROUNDING:
-            remedy = Remedy(f"the centre of mass of a uniform solid, displaced by ({digits(off.tolist())}) m along the body's axes")
-            finding = Finding("impossible", ("inertia",), (remedy,), "no body of this mass and shape has these moments about that point")
+            remedy = Remedy(
+                f"the centre of mass of a uniform solid, which is displaced by ({digits(off.tolist())}) m along the body's axes"
+            )
+            finding = Finding("impossible", ("inertia",), (remedy,), "less for these moments, this mass and shape")
             yield Answer(
                 "inertia", "distance of the centre of mass from a solid's", "m", measured=float(np.linalg.norm(off)), findings=(finding,)
             )

@@ -10,7 +10,7 @@ from mujoco import rollout
 
 from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
-from dropspin.comparisons.diagnosis.mujoco_file import ENUMERATIONS, GEOM, OPTIONS, MuJoCoFile, lowers_margin, mass_properties
+from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ENUMERATIONS, GEOM, OPTIONS, PLANE, MuJoCoFile, lowers_margin, mass_properties
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.diagnosis.parts import Part, Support, at_point
@@ -27,6 +27,8 @@ FLAT = 1e-9
 SPRING_STEPS = 20.0
 """Time steps of an impact on a spring that gives a coefficient of restitution."""
 LEAST_OF_A_SPRING = 0.01
+DEEP = 0.01
+"""Depth, relative to the size, from which a body that starts inside a surface is said to."""
 LEVEL = 0.1
 """Angle between gravity and the normal of a surface up to which the surface is level [°]."""
 NO_FLUID: Changes = {"density": 0.0, "viscosity": 0.0}
@@ -134,6 +136,9 @@ class MuJoCoBody(LooseBody):
         drag, option = Drag(*alone.damping), self._model.opt
         unmodelled = {"frictionloss": self._model.dof_frictionloss.any(), "density": option.density, "viscosity": option.viscosity}
         pose = multiply(alone.level, np.roll(file.data.xquat[alone.head], -1))
+        inside = 0.0 if surface is None or self._names[surface] == ADDED else self._start_inside(pose)
+        start = [f"a start {inside:.3g} m inside the surface"] * (inside > DEEP * self._model.stat.extent)
+        tilted = [f"a gravity {off:.3g}° from the inward normal of the surface"] * (off > LEVEL)
         return Facts(
             name=self._name,
             engine="MuJoCo",
@@ -161,10 +166,7 @@ class MuJoCoBody(LooseBody):
             written=self._text.written,
             settings=self._text.settings,
             ignored=list(self._text.ignored(self._properties, raised=raised)),
-            unmodelled=[
-                *file.unmodelled(alone.head),
-                *[f"a gravity {off:.3g}° from the inward normal of the surface"] * (off > LEVEL),
-            ],
+            unmodelled=[*file.unmodelled(alone.head), *start, *tilted],
             missed=file.missed(alone.geoms) if file.gravity.any() and off < 90.0 - LEVEL else "",
         )
 
@@ -194,6 +196,15 @@ class MuJoCoBody(LooseBody):
         mass = self._properties.mass
         load = float(np.linalg.norm(self._file.gravity)) * (1.0 - float(self._model.body_gravcomp[1])) * mass / (mass + armature) / points
         return contact.depth(load) - contact.settings.margin
+
+    def _start_inside(self, pose: Array) -> float:
+        """How far below a plane the body's lowest point is in the file [m]; 0 if it lands on a box, which it may be beside."""
+        alone, file = self._alone, self._file
+        parts = [part for part in self._parts if part.collides]
+        if file.model.geom_type[alone.surface] != PLANE or not parts:
+            return 0.0
+        centre = alone.above_plane(file.data.xpos[alone.head]) + rotate(pose, self._offset)
+        return -float(Support(parts).lowest(np.concatenate([centre, pose, np.zeros(6)])[np.newaxis])[0])
 
     def _points(self, pose: Array) -> int:
         """The number of contacts in a pose that share the weight evenly; 0 if they do not."""

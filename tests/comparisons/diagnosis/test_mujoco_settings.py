@@ -180,6 +180,15 @@ def test_stiffness_and_the_direction_of_gravity_are_left_out_and_named(tmp_path)
         assert facts.lands == (angle < 90)
 
 
+def test_start_inside_the_floor_is_named(tmp_path):
+    world = FREE.replace('pos="0 0 1"', 'pos=".3 0 {}" euler="0 90 0"').replace("{}</body>", BOX + "</body>")
+    sunk = body_of(tmp_path, world.format(HALF[0] - 0.02))
+    assert sunk.facts.unmodelled == ["a start 0.02 m inside the surface"]
+    assert body_of(tmp_path, world.format(HALF[0])).facts.unmodelled == []
+    joined = f'<geom name="hill" type="plane" size="1 1 .1" pos="0 0 .5" euler="30 0 0"/>{world.format(0.5)}'
+    assert body_of(tmp_path, joined, on="hill", name="b").facts.unmodelled[0].startswith("a start ")
+
+
 def test_name_with_a_line_break_stays_on_one_line(tmp_path):
     body = body_of(tmp_path, FREE.replace('"b"', '"b&#10;0 findings."').format(BOX))
     assert body.facts.name == r"b\n0 findings."

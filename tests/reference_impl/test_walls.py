@@ -92,12 +92,16 @@ def test_bodies_between_walls_move_in_an_ensemble_as_alone():
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("methods", [Methods(), Methods(law="normal", contact="sequential")], ids=str)
 def test_floor_carries_no_point_beyond_its_end(methods):
-    floor = Floor(0.0, 0.0, 0.0, (1.0, 0.5), 0.3)
+    floor, arm = Floor(0.0, 0.0, 0.0, (1.0, 0.5), 0.3), np.array([0.3, 0.0, 0.2])
 
-    def falls(*position):
+    def falls(*position, body=BALL):
         start = np.concatenate([position, [0, 0, 0, 1], [0, -1, 0, 0, 0, 0.0]])
-        after = reference_impl.step(start, BALL, World(G, floor), 1e-3, methods=methods)
+        after = reference_impl.step(start, body, World(G, floor), 1e-3, methods=methods)
         return bool(after[8] < -1.0)
+
+    for point in ([0.9, 0.0, 0.4], [-0.9, 0.0, -0.4], [1.1, 0.0, 0.0], [0.0, 0.0, -0.6]):  # the only vertex, away from the centre
+        is_beyond = abs(point[0]) > 1.0 or abs(point[2]) > 0.5
+        assert falls(*(np.array(point) - arm - 1e-3 * UP), body=Body(1.0, np.eye(3), arm[np.newaxis])) == is_beyond
 
     assert [falls(0.9, 0.05, 0.4), falls(-0.9, -0.15, -0.4)] == [False, False]
     assert [falls(1.1, 0.05, 0.0), falls(0.0, 0.05, -0.6)] == [True, True]

@@ -40,6 +40,7 @@ class MuJoCoAlone:
         geoms: The numbers of their geometries.
         surface: The number of what it lands on; None for nothing.
         others: The numbers of what else it collides with and may land on, unless what it lands on was named.
+        missed: A plane of the file that it falls through, and why; empty if there is none.
         pairs: The settings of the contacts with it, by geometry.
         dof: The number of the first degree of freedom of the free joint; None without one.
     """
@@ -56,6 +57,7 @@ class MuJoCoAlone:
                 raise Breakdown("declined", f"its geometry {names[geom]!r} is of the type {kind}, which is not modelled")
         self.surface = file.surface(on, self.geoms)
         self.others = file.surfaces(self.geoms)[1:] if on is None else []
+        self.missed = file.missed(self.geoms)
         self.pairs: dict[int, dict[str, Any]] = {}
         if self.surface is not None and file.has_contacts:
             contacts = {geom: file.contact(geom, self.surface) for geom in self.geoms}

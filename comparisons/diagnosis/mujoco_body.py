@@ -130,7 +130,8 @@ class MuJoCoBody(LooseBody):
     def _facts(self) -> Facts:
         alone, file = self._alone, self._file
         off = alone.gravity_angle
-        touching = alone.touching if off < 90.0 - LEVEL else None
+        is_above = off < 90.0 - LEVEL  # also without gravity
+        touching = alone.touching if is_above else None
         surface = None if touching is None else alone.surface
         raised = any(not np.array_equal(alone.clamped(pair), pair["solref"]) for pair in alone.pairs.values())
         drag, option = Drag(*alone.damping), self._model.opt
@@ -167,7 +168,7 @@ class MuJoCoBody(LooseBody):
             settings=self._text.settings,
             ignored=list(self._text.ignored(self._properties, raised=raised)),
             unmodelled=[*file.unmodelled(alone.head), *start, *tilted],
-            missed=file.missed(alone.geoms) if file.gravity.any() and off < 90.0 - LEVEL else "",
+            missed=alone.missed if is_above and file.gravity.any() else "",
         )
 
     @cached_property

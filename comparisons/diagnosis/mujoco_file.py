@@ -84,13 +84,16 @@ class MuJoCoFile:
         return {printable(mujoco.mj_id2name(self.model, kind, one) or f"{what} {one}"): one for one in range(number)}
 
     @cached_property
-    def unchanged(self) -> Any:
-        """The model with the masses and inertias that the file has, before the compiler changes them; impossible ones are balanced."""
+    def unchanged(self) -> tuple[Any, Any]:
+        """The model, with its data, before the compiler changes masses and inertias of the file; impossible ones are balanced."""
         spec = self._spec.copy()
         spec.compiler.boundmass, spec.compiler.boundinertia, spec.compiler.settotalmass = LEAST, LEAST, -1.0
         spec.compiler.balanceinertia, spec.compiler.inertiafromgeom = True, mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
         with quiet():
-            return spec.compile()
+            model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        return model, data
 
     @cached_property
     def heads(self) -> dict[str, int]:
@@ -185,9 +188,9 @@ class MuJoCoFile:
 
     def _still(self, own: Sequence[int]) -> list[int]:
         """The geometries of the world beside some and the plane that is added."""
-        model = self.model
-        still = [geom for geom in range(model.ngeom) if model.body_weldid[model.geom_bodyid[geom]] == 0]
-        return [geom for geom in still if geom not in own and geom != self.names(GEOM)[ADDED]]
+        left_out = {*own, self.names(GEOM)[ADDED]}
+        still = np.flatnonzero(self.model.body_weldid[self.model.geom_bodyid] == 0)
+        return [geom for geom in still.tolist() if geom not in left_out]
 
     def _collide(self, own: Sequence[int], other: int) -> bool:
         return any(self.contact(one, other) for one in own)

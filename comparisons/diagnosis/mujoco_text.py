@@ -54,10 +54,8 @@ class BodyText:
     @cached_property
     def written(self) -> MassProperties | None:
         """What the file says of the body and of what is welded to it, with moments that MuJoCo would balance as they are written."""
-        model, tensor = self._file.unchanged, self._tensor
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        found = mass_properties(model, data, self._file.group(self._head))
+        tensor = self._tensor
+        found = mass_properties(*self._file.unchanged, self._file.group(self._head))
         if found is None or tensor is None:
             return found
         wanted, has = np.linalg.eigvalsh(tensor), np.linalg.eigvalsh(found.inertia)

@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -48,10 +49,13 @@ def write_report(results: Results, folder: str | Path, sections: Sequence[Docume
 
 def fill(results: Results, folder: Path, sections: Sequence[Document] = (), plots: Collection[str] = ()) -> None:
     """Write the data and the reports of a run into an empty folder, and its plots as files of some `PLOT_FILES`."""
-    summary, charts_of = overview(results), report_charts(results)
-    save(results, folder, summary.conclusion)
+    summary = overview(results)
+    with ThreadPoolExecutor(1) as writer:  # the page is written while the motions are compressed
+        saved = writer.submit(save, results, folder, summary.conclusion)
+        charts_of = report_charts(results)
+        (folder / "report.html").write_text(html_report(results, summary, charts_of, sections), encoding="utf-8")
+        saved.result()
     results.table.to_csv(folder / "results.csv", index=False)
-    (folder / "report.html").write_text(html_report(results, summary, charts_of, sections), encoding="utf-8")
     (folder / "report.md").write_text(markdown(document(results, summary), level=2), encoding="utf-8")
     (folder / "junit.xml").write_bytes(junit_xml(results))
     if plots:

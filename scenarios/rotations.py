@@ -7,7 +7,7 @@ from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Arra
 
 def cross(a: Array, b: Array) -> Array:
     """A × b over the last axis; for few vectors, as in a root search, numpy.cross takes four times as long."""
-    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    product = np.empty(np.broadcast(a, b).shape)
     product[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     product[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
     product[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

@@ -33,7 +33,7 @@ def judge_agreement(
         if not (metric.agreement and metric.applies(scene, known)):
             continue
         try:
-            value, remark = metric.average(pairs).value, remark_on_horizon(scene, truth, metric)
+            value, remark = metric.value(pairs), remark_on_horizon(scene, truth, metric)
             judgement = Judgement(value, "measured", reason=joined(reason, remark), basis=basis)
         except Unresolved as error:
             verdict: Verdict = "no_truth" if isinstance(error, BeyondHorizon) else "measured"

@@ -98,6 +98,11 @@ class Comparison:
         return case
 
     @cached_property
+    def clearance(self) -> float:
+        """Height of the body's lowest point at the start [m]."""
+        return self.scene.clearance
+
+    @cached_property
     def exact(self) -> Trajectory:
         """The reference; metrics that need a reference apply only if there is one.
 
@@ -189,7 +194,7 @@ class Comparison:
         """
         fallen = self.exact[self.exact.t > self.impacts[0]] if self.impacts else self.exact[:0]
         exact = apex(self.scene, fallen)
-        if not len(fallen) or exact.max() - fallen.position[0, 1] > LOW * self.scene.clearance:
+        if not len(fallen) or exact.max() - fallen.position[0, 1] > LOW * self.clearance:
             return None
         last = len(self.compared) - 1
         before, after = self.first_contact or (0, last + 1 - len(fallen))

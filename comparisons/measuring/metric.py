@@ -74,9 +74,8 @@ class Metric:
 
     @np.errstate(all="ignore")  # an engine may return 0 or 1e300; the inf or NaN that follows is judged as such
     def _average(self, measure: Measure, cases: Sequence[Comparison]) -> "Average":
-        measured = [np.atleast_1d(measure(case)) for case in cases]
-        flights = min(map(len, measured))
-        phases = np.array([values[:flights] for values in measured])
+        phases = self._of_each(measure, cases)
+        flights = phases.shape[1]
         # Each quarter of the phases, which are evenly spread too, gives a mean.
         quarters = [phases[first::4].mean(axis=0) for first in range(min(4, len(phases)))]
         resolutions = 0.5 * np.ptp(quarters, axis=0)
@@ -90,12 +89,27 @@ class Metric:
             ranges = np.ptp(phases.reshape(-1, PHASES_OF_TOSS, *phases.shape[1:]), axis=1).max(axis=0)
         return Average(phases.mean(axis=0), resolutions, ranges / len(phases))
 
+    @np.errstate(all="ignore")
+    def value(self, cases: Sequence[Comparison]) -> float:
+        """The value of the average.
+
+        Raises:
+            Unresolved: The time step is too coarse.
+        """
+        return _largest(self._of_each(self.measure, cases).mean(axis=0))
+
     def value_or_nan(self, cases: Sequence[Comparison]) -> float:
         """The value of the average; NaN if the time step is too coarse."""
         try:
-            return self.average(cases).value
+            return self.value(cases)
         except Unresolved:
             return float("nan")
+
+    def _of_each(self, measure: Measure, cases: Sequence[Comparison]) -> Array:
+        """The values from each start phase, over the flights that all of them have, shape (phases, flights, …)."""
+        measured = [np.atleast_1d(measure(case)) for case in cases]
+        flights = min(map(len, measured))
+        return np.array([values[:flights] for values in measured])
 
 
 class Average(NamedTuple):
@@ -126,4 +140,9 @@ class Average(NamedTuple):
     @property
     def value(self) -> float:
         """The part with the largest absolute value, with its sign."""
-        return float(self.parts.flat[np.argmax(np.abs(self.parts))])
+        return _largest(self.parts)
+
+
+def _largest(parts: Array) -> float:
+    """The part with the largest absolute value, with its sign."""
+    return float(parts.flat[np.argmax(np.abs(parts))])

@@ -91,12 +91,12 @@ def bounce_height_error(case: Comparison) -> float:
     greatest height that the body reaches, or would reach in free flight, at any time after its own first contact.
     """
     if (apexes := case.greatest_apexes) is not None:
-        return (apexes[0] - apexes[1]) / case.scene.clearance
+        return (apexes[0] - apexes[1]) / case.clearance
     if len(case.flights) < 2:
         raise Unresolved(f"the flight after the impact is too short for steps of {case.dt:g} s")
     rows = case.flights[1]
     actual, exact = (apex(case.scene, motion[rows]) for motion in (case.compared, case.exact))
-    return float(np.mean(actual - exact)) / case.scene.clearance
+    return float(np.mean(actual - exact)) / case.clearance
 
 
 @_metric("1", "truth", requirements.has_newton_restitution, signed=True, first_flight=True)

@@ -140,9 +140,11 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
 
 def _trends(studies: pd.DataFrame) -> dict[Any, dict[str, str]]:
     """For each metric and engine, the behaviour of the error as dt → 0, its cause, and the worse of the verdicts of its two checks."""
+    pairs: dict[Any, list[Any]] = {}
+    for row in studies.to_dict("records"):
+        pairs.setdefault((row["metric"], row["engine"]), []).append(row)
     trends: dict[Any, dict[str, str]] = {}
-    for pair, group in studies.groupby(["metric", "engine"], sort=False):
-        rows = group.to_dict("records")
+    for pair, rows in pairs.items():
         order, asymptotic = (next((row for row in rows if row["kind"] == kind), None) for kind in STUDIES)
         m = asymptotic["value"] if asymptotic else float("nan")
         p = numbers.observed_order(order["value"], order["lower"], order["upper"]) if order else ""

@@ -1,17 +1,14 @@
 """The error budgets of a scene: for each error the asymptotic error with its interval, the cause, and a sentence."""
 
 import math
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from typing import Any
-
-import pandas as pd
 
 from dropspin.comparisons.judging.convergence import ARTEFACTS, SATURATION
 from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY
 from dropspin.comparisons.results.results import SMALLEST_STATED, Results, is_undecided
 from dropspin.reports.stories.numbers import Row, formatted, observed_order
 
-OF = ["metric", "engine"]
 EXPLAINED = {"known": "Expected", "limited": "Known limitation"}
 """The words before the reason of an expected model error, by verdict."""
 
@@ -23,18 +20,30 @@ def error_budgets(results: Results, scene_name: str) -> list[dict[Hashable, Any]
     `_of_limit`) and of its order (`_of_order`), which are NaN if undefined; the cause to which the error is attributed; and a sentence.
     """
     table = results.table[results.table["scene"] == scene_name]
-    errors = table[table["kind"].isin(["truth", "invariant"]) & ~table["metric"].isin(ARTEFACTS)]
-    columns = [*OF, "value", "lower", "upper", "cause", "verdict", "reason"]
-    limits, orders = (table[table["kind"] == kind][columns] for kind in ("asymptotic_error", "order"))
-    undecided = pd.MultiIndex.from_frame(table.loc[is_undecided(table), OF])
-    worth = (errors["value"].abs() > SMALLEST_STATED) | pd.MultiIndex.from_frame(errors[OF]).isin(undecided)
-    worth &= (errors["dt"] == errors["dt"].min()) & errors["engine"].isin(limits["engine"])
-    both = errors[worth].merge(limits, on=OF, how="left", suffixes=("", "_of_limit"))
-    both = both.merge(orders, on=OF, how="left", suffixes=("", "_of_order"))
-    both["cause"] = both["cause_of_limit"].where(both["value_of_limit"].notna(), "unresolved")
-    places = {metric: number for number, metric in enumerate(dict.fromkeys(errors["metric"]))}
-    ordered = both.sort_values("metric", key=lambda metrics: metrics.map(places), kind="stable")
-    return [row | {"sentence": _sentence(row)} for row in ordered.to_dict("records")]
+    rows = table.assign(undecided=is_undecided(table)).to_dict("records")
+    errors = [row for row in rows if row["kind"] in ("truth", "invariant") and row["metric"] not in ARTEFACTS]
+    limits, orders = ({_pair(row): row for row in rows if row["kind"] == kind} for kind in ("asymptotic_error", "order"))
+    undecided, judged = {_pair(row) for row in rows if row["undecided"]}, {engine for _, engine in limits}
+    finest = min((row["dt"] for row in errors), default=math.nan)
+    places = {metric: number for number, metric in enumerate(dict.fromkeys(row["metric"] for row in errors))}
+    budgets = []
+    for row in sorted(errors, key=lambda row: places[row["metric"]]):
+        is_worth_it = abs(row["value"]) > SMALLEST_STATED or _pair(row) in undecided
+        if is_worth_it and row["dt"] == finest and row["engine"] in judged:
+            budget = row | _suffixed(limits, row, "limit") | _suffixed(orders, row, "order")
+            budget["cause"] = "unresolved" if math.isnan(budget["value_of_limit"]) else budget["cause_of_limit"]
+            budgets.append(budget | {"sentence": _sentence(budget)})
+    return budgets
+
+
+def _pair(row: Row) -> tuple[str, str]:
+    return row["metric"], row["engine"]
+
+
+def _suffixed(studies: Mapping[tuple[str, str], Row], row: Row, of: str) -> dict[Hashable, Any]:
+    """The columns of the row that a study has for an error, NaN without one, by names that end in what they are of."""
+    study = studies.get(_pair(row), {})
+    return {f"{column}_of_{of}": study.get(column, math.nan) for column in ("value", "lower", "upper", "cause", "verdict", "reason")}
 
 
 def _sentence(row: Row) -> str:

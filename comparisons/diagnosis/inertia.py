@@ -7,11 +7,12 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import Answer, Finding, Remedy, digits, vector_text
 from dropspin.comparisons.diagnosis.loose_body import Facts, MassProperties
+from dropspin.scenarios.bodies.inertia import mean_squares
 from dropspin.scenarios.bodies.possible_moments import largest_multiple
+from dropspin.scenarios.bodies.shape import INERTIA_ROUNDING
 from dropspin.scenarios.state import Array
 
 MOMENT = "principal moment"
-ROUNDING = 1.001  # moments are often given with three or four digits
 SMALL = 1e-3
 """Share of the largest moment below which products of inertia are left out."""
 
@@ -34,18 +35,18 @@ def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | Non
     quantity, possible = "largest moment / sum of others", "at most 1 for any body"
     if least <= 0.0:
         excess, quantity, possible = least / largest if largest else 0.0, "least moment / largest", "more than 0 for any body"
-    elif largest > ROUNDING * (least + middle):
+    elif largest > INERTIA_ROUNDING * (least + middle):
         excess = largest / (least + middle)
     else:
         if not facts.parts:
             return
-        squares = (0.5 * np.trace(given.inertia) * np.eye(3) - given.inertia) / given.mass
+        squares = mean_squares(given.inertia, given.mass)
         points = facts.points + facts.offset - given.centre
         excess = _excess(points, squares)
-        if excess <= ROUNDING:
+        if excess <= INERTIA_ROUNDING:
             return
         off = np.zeros(3) if solid is None else solid.centre - given.centre
-        if off.any() and _excess(points - off, squares) <= ROUNDING:
+        if off.any() and _excess(points - off, squares) <= INERTIA_ROUNDING:
             remedy = Remedy(
                 f"the centre of mass of a uniform solid, which is displaced by ({digits(off.tolist())}) m along the body's axes"
             )
@@ -54,7 +55,7 @@ def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | Non
                 "inertia", "distance of the centre of mass from a solid's", "m", measured=float(np.linalg.norm(off)), findings=(finding,)
             )
             return
-        excess = factor if (factor := largest / largest_possible(given, points)) > ROUNDING else excess
+        excess = factor if (factor := largest / largest_possible(given, points)) > INERTIA_ROUNDING else excess
         quantity, possible = "largest moment / largest possible", "at most 1 for this mass and shape"
     finding = Finding("impossible", ("inertia",), remedies, possible)
     yield Answer("inertia", quantity, "1", measured=excess, physical=float(least > 0.0), findings=(finding,))
@@ -62,7 +63,7 @@ def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | Non
 
 def _excess(points: Array, squares: Array) -> float:
     """The factor by which second moments [m²], shape (3, 3), exceed what is possible inside the hull of points; infinite if none are."""
-    multiple = largest_multiple(points, squares, 1.0 / ROUNDING)
+    multiple = largest_multiple(points, squares, 1.0 / INERTIA_ROUNDING)
     return 1.0 / multiple if multiple > 0.0 else math.inf
 
 

@@ -29,14 +29,13 @@ from dropspin.comparisons.engines.mapping import (
 )
 from dropspin.comparisons.engines.mujoco_model import (
     FORM,
-    IMPEDANCE,
     INTEGRATORS,
     calibrated_specification,
     contact,
     damped_axes,
     default_specification,
 )
-from dropspin.comparisons.engines.mujoco_settings import CONTACT, FLAGS, OPTION, SETTINGS
+from dropspin.comparisons.engines.mujoco_settings import CONTACT, FLAGS, IMPEDANCE, OPTION, SETTINGS
 from dropspin.comparisons.engines.mujoco_simulation import MuJoCoBatch, MuJoCoSimulation
 from dropspin.comparisons.engines.options import NumericOption
 from dropspin.comparisons.engines.packages import Version, formatted, numbers_of

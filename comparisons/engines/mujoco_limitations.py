@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Array, KnownLimitation
-from dropspin.comparisons.engines.mujoco_model import IMPEDANCE
+from dropspin.comparisons.engines.mujoco_settings import IMPEDANCE
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Cylinder
 from dropspin.scenarios.bodies.surface import rise_of_centre

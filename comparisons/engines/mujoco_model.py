@@ -22,6 +22,8 @@ import mujoco
 import numpy as np
 
 from dropspin.comparisons.engines.mapping import bodies_in, box_of, friction_of, principal_frame
+from dropspin.comparisons.engines.mujoco_settings import CONTACT
+from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box, Capsule, Ellipsoid, Mesh, OnAxis, Sphere, Vertices
 from dropspin.scenarios.bodies.inertia import is_diagonal
@@ -29,7 +31,6 @@ from dropspin.scenarios.rotations import conjugate, multiply
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.surfaces import Surface
 
-IMPEDANCE = 0.9999  # the largest that MuJoCo allows
 MOST_DAMPED = 1e3
 INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
@@ -67,7 +68,7 @@ def contact(surface: Surface, dt: float, kappa: float = 0.0, spring_steps: float
         "condim": 3 if coefficient else 1,
         "friction": [coefficient, coefficient, 0.0, 0.0, 0.0],
         "solref": solref,
-        "solimp": [IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
+        "solimp": calibrated_values(CONTACT)["solimp"],
         "solreffriction": [0.0, -1.0 / dt],
     }
 

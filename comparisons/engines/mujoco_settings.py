@@ -9,6 +9,7 @@ import numpy as np
 from dropspin.comparisons.engines.options import Setting, spelled
 
 ANY = -float("inf")
+IMPEDANCE = 0.9999  # the largest that MuJoCo allows
 OVERRIDDEN = (("override", "enable"),)
 CONTACT = {
     "condim": Setting("3", "dimensions of a contact", why="1 without friction, 3 with", values=("1", "3", "4", "6"), is_computed=True),
@@ -29,7 +30,7 @@ CONTACT = {
     "solimp": Setting(
         (0.9, 0.95, 0.001, 0.5, 2.0),
         "impedance of a contact: smallest, largest, width [m], midpoint, power",
-        (0.9999, 0.9999, 0.001, 0.5, 2.0),
+        (IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0),
         "the hardest contact that MuJoCo allows, at any depth; at the default 0.9 to 0.95, restitution 0.5 becomes 0.466 at 0.25 ms, and "
         "boxes rest 2 mm deep",
     ),

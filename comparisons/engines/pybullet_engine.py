@@ -27,7 +27,7 @@ from dropspin.comparisons.engines.mapping import (
 from dropspin.comparisons.engines.options import Setting, calibrated_values
 from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.engines.pybullet_limitations import LARGEST_TURN, MOST_BALLS, STRONGEST_FRICTION
-from dropspin.comparisons.engines.pybullet_settings import BODY, FASTEST, FLOOR, NEVER_SLEEPS, SETTINGS, WORLD
+from dropspin.comparisons.engines.pybullet_settings import BODY, FLOOR, SETTINGS, WORLD
 from dropspin.comparisons.engines.pybullet_simulation import PyBulletSimulation
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
@@ -157,17 +157,17 @@ class PyBullet(Engine):
             found = dict.fromkeys(COEFFICIENTS, 1.0) if scene.wall else _coefficients(floor)
         if self.is_default:
             return found | rates | self._given(BODY)
-        found |= {"contactProcessingThreshold": 0.0} if floor else {}
+        is_clamped = not self.is_multibody or self.option("velocity_clamp") == "kept"
+        without = {"contactProcessingThreshold": floor is None, "maxJointVelocity": is_clamped}
+        found |= {name: value for name, value in calibrated_values(BODY).items() if not without.get(name)}
         found |= {name: float(-np.expm1(-rates.get(name, 0.0))) for name in ("linearDamping", "angularDamping")}
-        found["activationState"] = NEVER_SLEEPS
-        found |= {"maxJointVelocity": FASTEST} if self.is_multibody and self.option("velocity_clamp") == "lifted" else {}
         return found | self._given(BODY)
 
     def _surfaces(self, scene: Scenario) -> list[dict[str, Any]]:
         """The properties of the floor and each wall."""
-        given = {name.removeprefix("floor_"): value for name, value in self._given(FLOOR).items()}
-        begins = {} if self.is_default else {"contactProcessingThreshold": 0.0}
-        return [(_coefficients(one) if scene.wall else dict.fromkeys(COEFFICIENTS, 1.0)) | begins | given for one in scene.surfaces]
+        of_floor = ({} if self.is_default else calibrated_values(FLOOR)) | self._given(FLOOR)
+        properties = {name.removeprefix("floor_"): value for name, value in of_floor.items()}
+        return [(_coefficients(one) if scene.wall else dict.fromkeys(COEFFICIENTS, 1.0)) | properties for one in scene.surfaces]
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
         """The settings as Python, and the body's part of them as URDF."""

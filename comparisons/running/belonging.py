@@ -18,7 +18,7 @@ from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Arra
 from dropspin.scenarios.text import counted
 
 UNEVEN = 0.01
-"""Largest difference of a time step from the mean, as a share of it; times in text files are rounded."""
+"""Largest difference between two time steps, as a share of the mean; times in text files are rounded."""
 GAP = 1.5
 """Usual steps of time from which a step has a missing state: the nearest whole number of steps is then above 1."""
 GROSS = 0.1

@@ -8,15 +8,12 @@ from dropspin.comparisons.engines.registry import engine as engine_named
 from dropspin.comparisons.engines.registry import is_foreign, parsed
 from dropspin.comparisons.engines.stand_in import Traits, stand_in, traits
 from dropspin.comparisons.running.inputs import EngineEntry, described_value, several
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
 
-CONSTRUCTION = ResourceLimits(processor_time=60.0)
-"""What the import and the construction of an engine may use."""
 
-
-def engine_entry(engine: Engine | str, resources: ResourceLimits = CONSTRUCTION) -> EngineEntry:
+def engine_entry(engine: Engine | str, resources: ResourceLimits = ONE_MINUTE) -> EngineEntry:
     """An engine by its name, or an engine object, as an entry of a run.
 
     Args:

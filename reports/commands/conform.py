@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     "--check", "checks", multiple=True, metavar="CHECK", help="Run only this check, given by its name in the table; repeat for more."
 )
 @click.option("--traceback", is_flag=True, help="Print the whole traceback of each exception of the adapter.")
-@time_limit_option(60.0, "each check may use")
+@time_limit_option("each check may use")
 @as_json
 def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, resources: "ResourceLimits", json_output: bool) -> int:
     """Check an engine adapter against the protocol and against reference motions.

@@ -17,7 +17,7 @@ from dropspin.reports.commands.options import POSITIVE, as_json, engines_option,
 @click.option("--density", default=1000.0, type=POSITIVE, metavar="KG/M3", help="Density of a mesh.")
 @click.option("--restitution", type=click.FloatRange(0.0, 1.0), metavar="E", help="Target for the coefficient of restitution.")
 @click.option("--friction", type=POSITIVE, metavar="MU", help="Target for the coefficient of friction.")
-@time_limit_option(60.0, "an engine may use for one body")
+@time_limit_option("an engine may use for one body")
 @jobs_option("bodies to diagnose")
 @output_option("out/diagnosis", "for the tables and the report")
 @as_json

@@ -25,7 +25,7 @@ from dropspin.reports.commands.options import POSITIVE, as_json, engines_option,
     metavar="TOLERANCE",
     help="The largest error with which an engine counts as sound: a ratio, or an angle in radians.",
 )
-@time_limit_option(60.0, "an engine may use for one tested value")
+@time_limit_option("an engine may use for one tested value")
 @jobs_option("axes to scan")
 @output_option("out/limits", "for the tables and the figures")
 @as_json

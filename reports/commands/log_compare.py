@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from dropspin.reports.commands.options import as_json, engines_option, jobs_option, output_option, time_limit_option
+from dropspin.reports.commands.options import FIVE_MINUTES, as_json, engines_option, jobs_option, output_option, time_limit_option
 
 
 @click.command("compare")
@@ -13,7 +13,7 @@ from dropspin.reports.commands.options import as_json, engines_option, jobs_opti
 @click.option(
     "--fit", "fits", is_flag=True, help="First fit friction and restitution for each engine, to find the part of the error that they cause."
 )
-@time_limit_option(300.0, "an engine may use for all tosses")
+@time_limit_option("an engine may use for all tosses", FIVE_MINUTES)
 @jobs_option("engines")
 @output_option("out/log-compare", "for the tables and the report")
 @as_json

@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from dropspin.reports.commands.options import as_json, engines_option, jobs_option, output_option, time_limit_option
+from dropspin.reports.commands.options import FIVE_MINUTES, as_json, engines_option, jobs_option, output_option, time_limit_option
 
 
 @click.command("fit")
@@ -13,7 +13,7 @@ from dropspin.reports.commands.options import as_json, engines_option, jobs_opti
 @click.option(
     "--frames", type=click.IntRange(2, 100), default=8, metavar="N", help="Number of frames of each toss to use after its flight."
 )
-@time_limit_option(300.0, "an engine may use for one grid of parameters")
+@time_limit_option("an engine may use for one grid of parameters", FIVE_MINUTES)
 @jobs_option("engines")
 @output_option("out/log-fit", "for the tables and the report")
 @as_json

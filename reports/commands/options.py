@@ -70,6 +70,8 @@ class _Positive(click.FloatRange):
 
 
 POSITIVE = _Positive()
+ONE_MINUTE, FIVE_MINUTES = 60.0, 300.0
+"""Processor times of the `ResourceLimits` of these names [s], whose module takes longer to import than a command to print its help."""
 within_option = click.option(
     "--within",
     type=POSITIVE,
@@ -96,7 +98,7 @@ def seconds_option(*names: str, default: float, of: str, least: float = 0.0, cal
     return click.option(*names, type=kind, default=default, metavar="SECONDS", help=text, callback=callback)
 
 
-def time_limit_option(default: float, of: str) -> Callable[[Command], Command]:
+def time_limit_option(of: str, default: float = ONE_MINUTE) -> Callable[[Command], Command]:
     """The option `--time-limit` of an engine's process, of which a command gets the `ResourceLimits`."""
     return seconds_option("--time-limit", "resources", default=default, of=f"that {of}.", least=0.01, callback=_resources)
 

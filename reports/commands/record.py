@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @output_option("record", "of the record")
 @jobs_option("releases")
 @click.option("--scheduler", metavar="ADDRESS", help="Measure on the workers of a Dask cluster, such as tcp://host:8786.")
-@time_limit_option(60.0, "an engine may use for one simulation")
+@time_limit_option("an engine may use for one simulation")
 def record_command(sent: tuple[str, ...], output: str, jobs: int | None, resources: "ResourceLimits", *, pre: bool, **options: Any) -> int:
     """Measure every release of each engine, in an environment of its own, and keep the results.
 

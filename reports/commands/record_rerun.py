@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 @click.argument("release")
 @click.argument("scene")
 @click.option("-r", "--record", "folder", default="record", metavar="DIR", help="Folder of the record.")
-@time_limit_option(60.0, "the engine may use for one simulation")
+@time_limit_option("the engine may use for one simulation")
 @as_json
 def record_rerun_command(engine: str, release: str, scene: str, folder: str, resources: "ResourceLimits", json_output: bool) -> int:
     """Measure a cell of the record again, and compare the motions with the recorded ones bit for bit.

@@ -9,7 +9,7 @@ from dropspin.reports.commands.options import as_json, output_option, time_limit
 
 @click.command("reproduce")
 @click.argument("names", nargs=-1, metavar="[SOURCE]... [DIR]")
-@time_limit_option(60.0, "an engine may use for one run")
+@time_limit_option("an engine may use for one run")
 @output_option("out/reproduce", "for the tables")
 @as_json
 def reproduce_command(names: tuple[str, ...], output: str, json_output: bool, **options: Any) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dropspin.reports.commands.options import (
+    FIVE_MINUTES,
     as_json,
     baseline_option,
     engines_option,
@@ -39,7 +40,7 @@ CORE_ENGINES = ("wang", "mujoco", "pybullet")
 @click.option("--draw", "count", type=int, metavar="N", help="Add N random scenes, up to 1000, to the named ones.")
 @click.option("--seed", type=int, metavar="SEED", help="Seed of the random scenes. [default: a fresh seed, which is printed]")
 @click.option("--symmetries", "test_symmetries", is_flag=True, help="Also test the symmetries of each scene at the finest time step.")
-@time_limit_option(300.0, "an engine may use for one scene at one time step")
+@time_limit_option("an engine may use for one scene at one time step", FIVE_MINUTES)
 @jobs_option("scenes to run")
 @click.option(
     "--quick", is_flag=True, help="Run few initial states per scene, for a first answer from a slow engine; some checks stay undecided."

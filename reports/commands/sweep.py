@@ -13,7 +13,7 @@ from dropspin.reports.terminal.interrupts import stop_if_interrupted
 @click.option("-o", "--output", default="out/sweep", metavar="DIR", help="Folder for the table, or a URL of an object store.")
 @click.option("--resume", is_flag=True, help="Resume an interrupted sweep: jobs whose rows are already written are not run again.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://host:8786.")
-@time_limit_option(60.0, "an engine may use for one job")
+@time_limit_option("an engine may use for one job")
 @as_json
 def sweep_command(spec: str, output: str, json_output: bool, **options: Any) -> int:
     """Run every job of a grid or random sample over scenes, engines, options, time steps and initial states.

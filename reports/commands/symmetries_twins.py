@@ -11,7 +11,7 @@ from dropspin.reports.commands.options import as_json, jobs_option, step_option,
 @click.argument("scenes", nargs=-1, required=True, metavar="SCENE...")
 @click.option("-e", "--engine", "engines", multiple=True, required=True, metavar="ENGINE", help="An engine, with options; two or more.")
 @step_option("")
-@time_limit_option(60.0, "an engine may use for one scene")
+@time_limit_option("an engine may use for one scene")
 @jobs_option("scenes to run")
 @as_json
 def symmetries_twins_command(json_output: bool, **options: Any) -> None:

@@ -30,7 +30,7 @@ def conclusion(results: Results) -> list[Point]:
 
     Where too few scenes test a question to recommend an engine for it, the sentences state what these scenes say, and what to run.
     """
-    within = results.provenance["asked"].get("within") or WITHIN
+    within = _within(results)
     questions = grouped(conclude(results, within), lambda answer: answer.metric)
     tested = [answers for answers in questions.values() if answers[0].scenes >= ENOUGH]
     if tested:
@@ -44,9 +44,14 @@ def conclusion(results: Results) -> list[Point]:
 
 def conditions(results: Results) -> dict[str, list[str]]:
     """For each property by which the conclusion excepts scenes, such as Coulomb friction, the scenes that have it."""
-    within = results.provenance["asked"].get("within") or WITHIN
+    within = _within(results)
     excepted = dict.fromkeys(answer.condition for answer in conclude(results, within) if answer.condition and answer.is_recommended)
     return {name: [scene for scene, model in results.scenes.items() if CONDITIONS[name](model)] for name in excepted}
+
+
+def _within(results: Results) -> float:
+    """The largest error, relative to its scale, up to which an engine is recommended."""
+    return float(results.provenance["asked"].get("within") or WITHIN)
 
 
 def _recommendation(answers: Sequence[Answer], within: float) -> Point:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dropspin.comparisons.results.provenance import processor, versions
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown, simulate
 from dropspin.reports.document import Rows
 from dropspin.scenarios import DropspinError, load
@@ -16,7 +16,7 @@ def rows(engines: Sequence[str]) -> Rows:
     """Versions, processor, and whether each engine can take a time step."""
     facts = [{"what": package, "found": version or "not installed"} for package, version in versions().items()]
     facts += [{"what": "python", "found": sys.version.split()[0]}, {"what": "processor", "found": processor()}]
-    with EngineProcesses(ResourceLimits(processor_time=60.0)) as processes:
+    with EngineProcesses(ONE_MINUTE) as processes:
         facts += [{"what": f"engine {name}", "found": _health(name, processes)} for name in engines]
     return facts
 

@@ -80,12 +80,12 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
     """
     from dropspin.comparisons.running.entries import present_entry
     from dropspin.comparisons.running.inputs import verify_time_step
-    from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+    from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses
     from dropspin.comparisons.running.recording import Breakdown
 
     verify_time_step(scene, dt)
     entry = present_entry(engine_name)
-    with EngineProcesses(ResourceLimits(processor_time=60.0)) as processes:
+    with EngineProcesses(ONE_MINUTE) as processes:
         rows = processes.call(entry, _built, scene, dt)
     if isinstance(rows, Breakdown):
         raise EngineBroken(f"{entry.label} cannot build {scene.name}: {rows.reason}.")

@@ -21,6 +21,11 @@ def _possible(moments: tuple[float, ...]) -> tuple[float, ...]:
     return moments
 
 
+def mean_squares(inertia: Array, mass: float) -> Array:
+    """The means of x xᵀ over the mass [m²], shape (3, 3), of a tensor of inertia [kg m²], shape (3, 3)."""
+    return (0.5 * np.trace(inertia) * np.eye(3) - inertia) / mass
+
+
 def symmetric(values: Sequence[Any]) -> list[list[Any]]:
     """The rows of a symmetric matrix of which xx, yy, zz, xy, xz, yz are given."""
     xx, yy, zz, xy, xz, yz = values

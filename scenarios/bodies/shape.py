@@ -14,14 +14,14 @@ import numpy as np
 from pydantic import model_validator
 
 from dropspin.scenarios.bodies.hull import Outline, around_axis, outline
-from dropspin.scenarios.bodies.inertia import Moments, is_diagonal, tensor
+from dropspin.scenarios.bodies.inertia import Moments, is_diagonal, mean_squares, tensor
 from dropspin.scenarios.bodies.possible_moments import largest_multiple
 from dropspin.scenarios.bodies.surface import RIM, rise_of_centre
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.tables import Positive, Table, Vector
 
-INERTIA_ROUNDING = 1.001  # moments are often given with four digits
+INERTIA_ROUNDING = 1.001  # moments are often given with three or four digits
 AROUND = 64
 """Points of each circle of the polytope around a round body."""
 MIRRORED = np.array([[1.0, -1.0, -1.0], [-1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]])
@@ -173,7 +173,7 @@ class Shape(Table):
         """Why the given moments of inertia are impossible for a body of this shape; empty if a distribution of its mass has them."""
         if isinstance(self.inertia, str):
             return ""
-        squares = (0.5 * np.trace(self.inertia_tensor) * np.eye(3) - self.inertia_tensor) / self.mass
+        squares = mean_squares(self.inertia_tensor, self.mass)
         multiple = self.possible_multiple(squares, 1.0 / INERTIA_ROUNDING)
         if multiple * INERTIA_ROUNDING >= 1.0:
             return ""

@@ -28,8 +28,9 @@ from dropspin.comparisons.logs.flight import (
 from dropspin.comparisons.logs.flights import Flights, flights_of
 from dropspin.comparisons.logs.log import LENGTHS, TIMES, UPRIGHT, Cause, Finding, Header, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
-from dropspin.comparisons.logs.recorded import of_floor, of_frames, of_quaternions, of_spins
+from dropspin.comparisons.logs.recorded import of_floor, of_frames, of_quaternions, of_spins, orders_of_axes
 from dropspin.comparisons.logs.rest import rests
+from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import unrotate
@@ -105,7 +106,7 @@ class Check:
     @property
     def reads_the_columns_right(self) -> bool:
         """Whether the header states units, axes, quaternions and the floor correctly; an error of the scale is ignored."""
-        return not any(finding.kind in ("up", "unit", "quaternion", "floor") for finding in self.findings)
+        return not any(finding.kind in ("up", "unit", "quaternion", "body axes", "floor") for finding in self.findings)
 
 
 def log_check(recording: Flights | Log | str | Path) -> Check:
@@ -250,14 +251,27 @@ def _moments(inertia: Array) -> list[Any]:
 def _of_inertia(flights: Flights, drag: Regression, values: Sequence[Value]) -> Iterator[Finding]:
     """Of ratios of moments of inertia that differ from the header's, and of drag, as far as they are identifiable."""
     found, body = flights.turning, flights.log.header.body
-    ratios = np.where(_known(values, RATIOS), found.values, 0.0)
+    known = _known(values, RATIOS)
+    ratios = np.where(known, found.values, 0.0)
     stretched = np.exp(0.5 * np.array([ratios[0], 0.0, ratios[1]]))
     keys = {"body.inertia": _moments(body.inertia_tensor * np.outer(stretched, stretched))}
-    for kind, value, wide in zip(("inertia, x", "inertia, z"), ratios, found.half_widths(ALARM), strict=True):
-        if abs(value) > max(wide, 0.01):
-            yield Finding(kind, math.exp(value), 1.0, causes=(Cause("moments of inertia", keys=keys),))
+    wide = found.half_widths(ALARM)
+    orders = tuple(_orders_that_fit(body, ratios, np.where(known, wide, np.inf)))
+    causes = (*orders, Cause("other moments" if orders else "moments of inertia", keys=keys))
+    for kind, value, error in zip(("inertia, x", "inertia, z"), ratios, wide, strict=True):
+        if abs(value) > max(error, 0.01):
+            yield Finding(kind, math.exp(value), 1.0, causes=causes)
     if _known(values, ["drag"]).all() and drag.values[-1] > drag.half_widths(ALARM)[-1]:
         yield Finding("drag", float(drag.values[-1]), 0.0)
+
+
+def _orders_that_fit(body: Body, ratios: Array, wide: Array) -> Iterator[Cause]:
+    """The orders of the body's axes with which the ratios of its moments are as measured: logarithms over the header's, shape (2,)."""
+    own = np.diag(body.inertia_tensor)
+    for inertia, cause in orders_of_axes(body):
+        changes = np.log(np.diag(inertia) / own)
+        if (np.abs(changes[[0, 2]] - changes[1] - ratios) <= wide).all():
+            yield cause
 
 
 def _values(flights: Flights, drag: Regression) -> Iterator[Value]:

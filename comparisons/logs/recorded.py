@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 
@@ -13,9 +14,13 @@ from dropspin.comparisons.logs.noise import Noise
 from dropspin.comparisons.logs.rest import level_share, rests
 from dropspin.comparisons.logs.rotors import rotation
 from dropspin.comparisons.running.belonging import missing_frames
+from dropspin.scenarios.bodies import Body, Box, Ellipsoid
+from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.rotations import conjugate, length, multiply, rotate, unrotate
 from dropspin.scenarios.state import Array
 
+EXPLAINED = 0.4
+"""Share of the difference from the rotation of a free body that another reading of the orientations leaves at most."""
 MOST_ROTORS = 8
 """Flights whose rotation is tried in other readings."""
 RESTS_NEAR = 0.04
@@ -35,23 +40,43 @@ def _read_as(toss: Toss, header: Header, rolled: int, inverse: bool) -> Toss:
 
 
 def of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
-    """Of quaternions that another reading explains: bodies then rest on faces, or turn as free bodies do."""
+    """Of quaternions that another reading, or other axes of the body, explain: bodies then rest on faces, or turn as free bodies do."""
     other, rolled = ("wxyz", -1) if log.header.quaternion == "xyzw" else ("xyzw", 1)
     inverse = "body-to-world" if log.header.rotation == "world-to-body" else "world-to-body"
     level, count = level_share(log)
     inertia = log.header.body.inertia_tensor
     is_ball = bool(np.allclose(inertia, inertia[0, 0] * np.eye(3)))  # a spin is constant then, in every reading
     turns = _restlessness([rotor.samples.values for rotor in flights.rotations])
+    tried = flights.found[:MOST_ROTORS] if not is_ball else []
+    orders = list(orders_of_axes(log.header.body)) if tried else []
+    lefts = [_restlessness([rotation(flight, exchanged).samples.values for flight in tried]) for exchanged, _ in orders]
+    left = min(lefts, default=math.inf)
     order, direction = {"quaternion": other}, {"rotation": inverse}
     for roll, turned, keys in ((rolled, False, order), (0, True, direction), (rolled, True, order | direction)):
         read = replace(log, tosses=tuple(_read_as(toss, log.header, roll, turned) for toss in log.tosses))
-        tried = flights.found[:MOST_ROTORS] if not is_ball else []
         some = [replace(flight, toss=_read_as(flight.toss, log.header, roll, turned)) for flight in tried]
         again = _restlessness([rotation(flight, inertia).samples.values for flight in some]) if some else turns
         share, _ = level_share(read)
-        if (count >= 3 and level < 0.7 and share > 0.9 and again < 2.0 * turns) or (again < 0.4 * turns and not share < 0.9 * level):
+        shown_at_rest = count >= 3 and level < 0.7 and share > 0.9 and again < 2.0 * turns
+        if shown_at_rest or (again < min(EXPLAINED * turns, left) and not share < 0.9 * level):
             yield Finding("quaternion", level, share, causes=(Cause("reading of the quaternions", keys=keys),))
             return
+    if left < EXPLAINED * turns:
+        yield Finding("body axes", turns, left, causes=(orders[lefts.index(left)][1],))
+
+
+def orders_of_axes(body: Body) -> Iterator[tuple[Array, Cause]]:
+    """The inertia of the body with its axes in each other order [kg m²], shape (3, 3), and the cause with that order."""
+    inertia = body.inertia_tensor
+    if not is_diagonal(inertia):
+        return
+    vectors = {"half_extents": body.half_extents, "center_of_mass": body.center_of_mass} if isinstance(body, Box | Ellipsoid) else {}
+    vectors |= {"inertia": body.moments} if vectors and isinstance(body.inertia, tuple) else {}
+    for axes in permutations(range(3)):
+        exchanged = inertia[np.ix_(axes, axes)]
+        if not np.array_equal(exchanged, inertia):
+            keys = {f"body.{name}": [vector[axis] for axis in axes] for name, vector in vectors.items() if vector and any(vector)}
+            yield exchanged, Cause("body axes", keys=keys)
 
 
 def _restlessness(left: list[Array]) -> float:

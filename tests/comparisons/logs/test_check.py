@@ -11,11 +11,12 @@ from support.tosses import BRICK, CUBE, made, turned
 from dropspin.comparisons.logs import check as checks
 from dropspin.comparisons.logs.check import CENTRES, RATIOS, Check, log_check
 from dropspin.comparisons.logs.flights import flights_of
-from dropspin.comparisons.logs.log import Finding, Log, Toss, load_log
+from dropspin.comparisons.logs.log import Finding, Header, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression
 from dropspin.comparisons.logs.recorded import of_frames
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
+from dropspin.scenarios.validation import validated
 
 NOISE = (2e-4, 2e-3)
 ON_SIDE = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
@@ -90,6 +91,38 @@ def test_another_upward_axis_is_named() -> None:
 def test_another_reading_of_quaternions_is_named_by_the_motion_of_a_brick(change: Callable[[Toss], Any], keys: dict[str, str]) -> None:
     found = only(log_check(changed(sound(count=8, body=BRICK), orientation=change)))
     assert (found.kind, cure(found)) == ("quaternion", keys)
+
+
+def with_body(log: Log, body: dict[str, Any]) -> Log:
+    """The recording with another body in its header."""
+    return replace(log, header=validated(Header, "header", log.header.model_dump() | {"body": body}))
+
+
+def test_edges_in_another_order_are_named_by_the_motion_of_a_brick() -> None:
+    edges = [0.04, 0.05, 0.07]
+    body = {"shape": "box", "half_extents": edges, "mass": 0.4}
+    log = sound(count=6, body=body)
+    check = log_check(with_body(log, body | {"half_extents": [0.07, 0.04, 0.05]}))
+    assert (only(check).kind, cure(only(check))) == ("body axes", {"body.half_extents": edges})
+    assert check.corrected == log.header
+
+
+@pytest.mark.extended
+def test_two_edges_that_are_exchanged_and_other_moments_are_alternatives() -> None:
+    body = {"shape": "box", "half_extents": [0.04, 0.05, 0.07], "mass": 0.4}
+    check = log_check(with_body(sound(count=6, body=body), body | {"half_extents": [0.05, 0.04, 0.07]}))
+    for found in check.findings:
+        assert found.kind.startswith("inertia")
+        assert [cause.name for cause in found.causes] == ["body axes", "other moments"]
+        assert found.causes[0].keys == {"body.half_extents": [0.04, 0.05, 0.07]}
+    assert check.findings
+
+
+@pytest.mark.extended
+def test_a_bar_along_another_axis_than_a_cylinder_is_named_without_a_key() -> None:
+    body = {"shape": "cylinder", "radius": 0.05, "half_length": 0.2, "mass": 1.0}
+    found = only(log_check(with_body(sound(count=6, body=body | {"inertia": [0.01390, 0.01390, 0.00125]}), body)))
+    assert (found.kind, cure(found)) == ("body axes", {})
 
 
 def test_the_order_of_quaternions_of_a_cube_is_named_by_the_faces_it_rests_on() -> None:

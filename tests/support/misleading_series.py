@@ -139,6 +139,18 @@ def growing_plateau(rng: np.random.Generator, h: Array, _least: float) -> Series
     return Series(m * (1.0 - 0.2 * h) + rest, 0.0, True, m)
 
 
+def opposite(rng: np.random.Generator, h: Array) -> Array:
+    """First order, and third of the other sign and of .3 to 100 times its size at the coarsest step."""
+    first = coefficient(rng, 0.3, 3.0)
+    return first * h - first * math.exp(rng.uniform(math.log(0.3), math.log(100.0))) * h**3
+
+
+def size_of_opposite(rng: np.random.Generator, h: Array, least: float) -> Series:
+    """The size of such an error, which does not show its change of sign."""
+    m = limit(rng, least)
+    return Series(np.abs(m + opposite(rng, h)), 0.0, False, abs(m))
+
+
 HELD_OUT_KINDS: dict[str, Draw] = {
     "order 2.5, a little of order 1.25": plain(competing(2.5, 1.25)),
     "order 3, a little of order 1, then of 2": plain(lambda rng, h: competing(3.0, 1.0)(rng, h) + coefficient(rng, 1e-3, 1e-2) * h**2),
@@ -148,6 +160,8 @@ HELD_OUT_KINDS: dict[str, Draw] = {
     "order 1.5, close steps": plain(powers(1.5, 0.5)),
     "plateau that is approached from below": growing_plateau,
     "order 1 with a cosine of a remainder": plain(of_cosine),
+    "orders 1 and 3 of opposite signs": plain(opposite),
+    "absolute values of orders 1 and 3 of opposite signs": size_of_opposite,
 }
 """Families that were not looked at until all constants had been chosen."""
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,29 @@ IMPACTS = (0.5, 1.0, 3.0)  # m/s
 PHASES, FEWER = 8, 4
 """Start phases at the file's time step, and at finer ones."""
 LEAST_NOISE = 1e-6  # of a ratio of speeds
+LONGEST_WATCHED = 3.0  # s, for an impact on a soft surface
+STILL = 0.01
+"""Share of the speed of an impact at which a body that has not left the surface rests on it."""
+THROUGH = "none"
+"""The rebound of a body that passes through the surface."""
+
+
+class Impacts(NamedTuple):
+    """Impacts of a body at one speed, one for each start phase; values are NaN if the body is not seen to leave the surface or to rest.
+
+    Attributes:
+        ratios: Rebound speed over impact speed.
+        upward: Largest upward speed of the centre of mass over impact speed.
+        depths: Largest depth [m].
+        times: Time in contact [s]; infinite if the body does not leave the surface.
+        failure: Why values are NaN; empty if they are not.
+    """
+
+    ratios: Array
+    upward: Array
+    depths: Array
+    times: Array
+    failure: str = ""
 
 
 def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
@@ -26,64 +50,79 @@ def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     if "restitution" in body.remedies:
         lively = body.tried(("restitution",))
         answers += [rebound(lively, dts, speed, f"{REBOUND} on a surface with restitution 1") for speed in IMPACTS]
-    _, upward, depths, times = _rebounds(body, 1.0, dts[0], PHASES)
-    longest = float(np.max(times))
-    detail = f"> {WATCHED:g} s" if math.isinf(longest) else ""
-    of_upward = Answer("impact", "largest upward / impact speed", "1", speed=1.0, measured=float(np.mean(upward)))
-    answers.append(replace(of_upward, least=float(min(upward)), most=float(max(upward))))
-    answers.append(Answer("impact", "penetration", "m", speed=1.0, measured=float(np.max(depths))))
-    answers.append(Answer("impact", "contact", "s", speed=1.0, measured=longest, detail=detail))
+    found = _impacts(body, 1.0, dts[0], PHASES)
+    blank = Answer("impact", "", "1", speed=1.0, detail=found.failure)
+    of_upward = replace(blank, quantity="largest upward / impact speed", measured=float(np.mean(found.upward)))
+    answers.append(replace(of_upward, least=float(min(found.upward)), most=float(max(found.upward))))
+    answers.append(replace(blank, quantity="penetration", unit="m", measured=float(np.max(found.depths))))
+    longest = float(np.max(found.times))
+    detail = found.failure or (f"> {WATCHED:g} s" if math.isinf(longest) else "")
+    answers.append(replace(blank, quantity="contact", unit="s", measured=longest, detail=detail))
     return answers
 
 
 def rebound(body: LooseBody, dts: Sequence[float], speed: float, quantity: str) -> Answer:
     """The rebound over the speed of an impact [m/s], the mean over start phases: a finding if time step, phase or engine change it."""
-    ratios = [_rebounds(body, speed, dt, FEWER if number else PHASES)[0] for number, dt in enumerate(dts)]
+    found = [_impacts(body, speed, dt, FEWER if number else PHASES) for number, dt in enumerate(dts)]
+    exact = math.nan if body.facts.restitution is None else body.facts.restitution
+    answer = Answer("impact", quantity, "1", speed=speed, in_force=exact, detail=found[0].failure)
+    kind: Kind
+    if found[0].failure:
+        kind = "setting" if found[-1].failure == THROUGH else "time step"
+        why = "because the body passes through the surface, which harder contacts or smaller time steps prevent"
+        return replace(answer, findings=(Finding(kind, ("timestep",), detail=why),) * (found[0].failure == THROUGH))
+    ratios = [impacts.ratios for impacts in found if not impacts.failure]
     means = [float(np.mean(ratio)) for ratio in ratios]
     limit = 0.0 if max(means) == 0.0 else math.nan
-    if is_sufficient(dts) and max(means) > 0.0:
+    if is_sufficient(dts[: len(means)]) and max(means) > 0.0:
         noise = [max(float(np.ptp(ratio)) / math.sqrt(12.0) / len(ratio), LEAST_NOISE) for ratio in ratios]
         budget = error_budget(dts, means, resolution=noise, signed=False, negligible=0.1 * NOTEWORTHY)
         limit = math.nan if budget.cause == "unresolved" else budget.asymptotic_error
-    exact = math.nan if body.facts.restitution is None else body.facts.restitution
     change = abs(means[0] - (means[-1] if math.isnan(exact) else exact))
     findings: tuple[Finding, ...] = ()
     if max(change, float(np.ptp(ratios[0]))) > NOTEWORTHY:
         stays = not math.isnan(exact) and abs(means[-1] - exact) >= 0.6 * change
-        kind: Kind = "model" if stays else "time step"
-        finest = "" if math.isfinite(limit) or len(dts) < 2 else f"but {means[-1]:.3g} at {1e3 * dts[-1]:.3g} ms"
+        kind = "model" if stays else "time step"
+        finest = "" if math.isfinite(limit) or len(means) < 2 else f"but {means[-1]:.3g} at {1e3 * dts[len(means) - 1]:.3g} ms"
         findings = (Finding(kind, (*body.causes.get("impact", ()), "timestep"), detail=finest),)
-    answer = Answer("impact", quantity, "1", speed=speed, measured=means[0], in_force=exact, limit=limit, findings=findings)
-    return replace(answer, least=float(min(ratios[0])), most=float(max(ratios[0])))
+    return replace(answer, measured=means[0], limit=limit, findings=findings, least=float(min(ratios[0])), most=float(max(ratios[0])))
 
 
-def _rebounds(body: LooseBody, speed: float, dt: float, phases: int) -> tuple[Array, Array, Array, Array]:
-    """For each start phase: the rebound speed and the largest upward speed over the impact speed, depth [m] and time in contact [s].
+def _impacts(body: LooseBody, speed: float, dt: float, phases: int) -> Impacts:
+    """The impacts at a speed [m/s], watched until the body leaves the surface or rests on it, or for `LONGEST_WATCHED`.
 
     The rebound speed is that which the height above the surface would need, which the body reaches from its speed as it leaves the surface.
     """
     facts = body.facts
-    g = facts.gravity
-    steps = math.ceil(WATCHED / dt)
-    gap = facts.margin
+    g, gap = facts.gravity, facts.margin
+    size = float(np.linalg.norm(facts.points, axis=1).max())
     starts = [facts.start(height=gap + speed * dt * (phase + 0.5) / phases, velocity=-speed * UP) for phase in range(phases)]
-    ratios, fastest, depths, times = [], [], [], []
-    for states in body.motions(np.array(starts), dt, steps, -g * UP, floor=True):
-        heights = facts.lowest(states)
-        rows = np.arange(len(heights))
-        touched = int(np.argmax(heights < gap)) if (heights < gap).any() else len(heights) - 1
-        again = rows[(rows > touched) & (heights > gap)]
-        watched = int(again[0]) - touched if len(again) else len(rows)
-        lowest = touched + int(np.argmin(heights[touched : touched + min(watched, max(2, math.ceil(0.1 / dt)))]))
-        left = rows[(rows > lowest) & (heights > gap)]
-        upward = float(states[left[0], VELOCITY][1]) if len(left) else 0.0
-        energy = upward**2 + 2.0 * g * (heights[left[0]] - gap) if upward > 0.0 else 0.0
-        at_impact = math.sqrt(speed**2 + 2.0 * g * (heights[0] - gap))
-        ratios.append(math.sqrt(energy) / at_impact)
-        fastest.append(max(0.0, float(states[:, VELOCITY][:, 1].max())) / at_impact)
-        depths.append(max(0.0, -float(heights.min())))
-        times.append((left[0] - touched) * dt if len(left) else math.inf)
-    return np.array(ratios), np.array(fastest), np.array(depths), np.array(times)
+    for seconds in (WATCHED, LONGEST_WATCHED):
+        motions = body.motions(np.array(starts), dt, math.ceil(seconds / dt), -g * UP, floor=True)
+        heights = [facts.lowest(states) for states in motions]
+        found = np.array([_impact(states, of_states, gap, dt, speed, g) for states, of_states in zip(motions, heights, strict=True)])
+        moves = np.array([np.ptp(of_states[-len(of_states) // 3 :]) > STILL * speed * seconds for of_states in heights])
+        if not (np.isinf(found[:, 3]) & moves).any():
+            return Impacts(*found.T)
+    is_through = any(of_states[-1] < -2.0 * size for of_states in heights)
+    unknown = np.full(phases, math.nan)
+    return Impacts(unknown, unknown, unknown, unknown, THROUGH if is_through else f"contact > {LONGEST_WATCHED:g} s")
+
+
+def _impact(states: Array, heights: Array, gap: float, dt: float, speed: float, g: float) -> tuple[float, float, float, float]:
+    """The values of `Impacts` of one motion, from the heights of its lowest point."""
+    rows = np.arange(len(heights))
+    touched = int(np.argmax(heights < gap)) if (heights < gap).any() else len(heights) - 1
+    again = rows[(rows > touched) & (heights > gap)]
+    watched = int(again[0]) - touched if len(again) else len(rows)
+    lowest = touched + int(np.argmin(heights[touched : touched + min(watched, max(2, math.ceil(0.1 / dt)))]))
+    left = rows[(rows > lowest) & (heights > gap)]
+    upward = float(states[left[0], VELOCITY][1]) if len(left) else 0.0
+    energy = upward**2 + 2.0 * g * (heights[left[0]] - gap) if upward > 0.0 else 0.0
+    at_impact = math.sqrt(speed**2 + 2.0 * g * (heights[0] - gap))
+    fastest = max(0.0, float(states[:, VELOCITY][:, 1].max())) / at_impact
+    depth, time = max(0.0, -float(heights.min())), (left[0] - touched) * dt if len(left) else math.inf
+    return math.sqrt(energy) / at_impact, fastest, depth, time
 
 
 def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:

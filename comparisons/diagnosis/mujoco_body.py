@@ -166,7 +166,7 @@ class MuJoCoBody(LooseBody):
             rest_depth=self._rest_depth(pose),
             written=self._text.written,
             settings=self._text.settings,
-            ignored=list(self._text.ignored(self._properties, raised=raised)),
+            ignored=list(self._text.ignored(self._properties, raised=raised, condim=0 if touching is None else int(touching["condim"]))),
             unmodelled=[*file.unmodelled(alone.head), *start, *tilted],
             missed=alone.missed if is_above and file.gravity.any() else "",
         )

@@ -96,6 +96,27 @@ class MuJoCoFile:
         return model, data
 
     @cached_property
+    def exact(self) -> tuple[Any, Any] | None:
+        """The model, with its data, if meshes have exact volumes, of which MuJoCo counts parts twice by default.
+
+        None without such meshes, or if MuJoCo refuses one: its surface is open, or inside out.
+        """
+        spec = self._spec.copy()
+        counted = [mesh for mesh in spec.meshes if mesh.inertia == mujoco.mjtMeshInertia.mjMESH_INERTIA_LEGACY]
+        for mesh in counted:
+            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT
+        try:
+            with quiet():
+                model = spec.compile() if counted else None
+        except ValueError:
+            model = None
+        if model is None:
+            return None
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        return model, data
+
+    @cached_property
     def heads(self) -> dict[str, int]:
         """The bodies that move against their parents, by name; of a URDF file, whose root is welded to the world, that too."""
         welded, bodies = self.model.body_weldid, self.names(BODY)

@@ -7,7 +7,7 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import digits
+from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, digits
 from dropspin.comparisons.diagnosis.loose_body import MassProperties
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile, mass_properties
 from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
@@ -22,6 +22,8 @@ SAME = 1e-6
 IN_FORCE = {"lateral_friction": 1.0, "rolling_friction": 0.0, "spinning_friction": 0.0, "restitution": 0.0}
 IN_FORCE |= {"stiffness": math.nan, "damping": math.nan}
 """The settings of a contact in a URDF file, which MuJoCo does not read, and what it has instead."""
+FURTHER = {"torsional": (1, 4, 0.005), "rolling": (2, 6, 1e-4)}
+"""The place of a coefficient of friction, the dimensions of contacts that have it, and its default."""
 CHANGED_BY = {
     "mass": ("boundmass", "settotalmass", "inertiafromgeom"),
     "inertia": ("balanceinertia", "boundinertia", "settotalmass", "inertiafromgeom"),
@@ -139,12 +141,13 @@ class BodyText:
             found += [geom.changed(contact | {"priority": MOST_URGENT}) for geom in self._geoms[:1]]
         return ", ".join(map(str, found)) or " ".join(f'{name}="{value}"' for name, value in others.items())
 
-    def ignored(self, in_force: MassProperties, *, raised: bool) -> Iterator[tuple[str, Setting, str]]:
+    def ignored(self, in_force: MassProperties, *, raised: bool, condim: int) -> Iterator[tuple[str, Setting, str]]:
         """What the file says and MuJoCo changes or does not use.
 
         Args:
             in_force: The mass and the inertia in force.
             raised: Whether the time constant of a contact is raised.
+            condim: The dimensions of the contact with what the body lands on; 0 without one.
         """
         settings, written = self.settings, self.written
         if raised:
@@ -158,6 +161,12 @@ class BodyText:
                 made = f"refused ({self._file.refusal}); measured with balanceinertia" if self._file.refusal else "changed"
                 made = made if wanted.any() else "0, with which MuJoCo simulates no body; measured with that of a uniform solid"
                 yield self._changed("inertia", f"{made}: moments {digits(has.tolist())} kg m²")
+        yield from self._miscounted()
+        if condim and (
+            unused := [name for name, (place, least, most) in FURTHER.items() if condim < least and self._friction(place) > most]
+        ):
+            needed = " and ".join(f"{name} friction needs condim {FURTHER[name][1]}" for name in unused)
+            yield "friction", settings["friction"], f"used in part: {needed}, and condim is {condim}"
         if self._file.is_urdf:
             element = self.element
             if self._file.model.body_weldid[self._head] == 0:
@@ -166,6 +175,23 @@ class BodyText:
                 for found in [] if element is None else element.every(tag):
                     if found.number("value", value) != value:
                         yield tag, found.words, "not read"
+
+    def _friction(self, place: int) -> float:
+        """A coefficient of friction that the file has; 0 if it has none in this place."""
+        written = self.settings.get("friction")
+        numbers = written.text.partition('"')[2].strip('"').split() if written else []
+        return float(numbers[place]) if len(numbers) > place else 0.0
+
+    def _miscounted(self) -> Iterator[tuple[str, Setting, str]]:
+        """A mass that is not that of the volumes of the body's meshes."""
+        if self._file.exact is None:
+            return
+        group = self._file.group(self._head)
+        has, exact = (mass_properties(*compiled, group) for compiled in ((self._file.model, self._file.data), self._file.exact))
+        if has is not None and exact is not None and abs(has.mass - exact.mass) > NOTEWORTHY * exact.mass:
+            meshes = list(self._file.source.every("mesh"))
+            made = f'counted as {has.mass:.4g} kg by default; its volume has {exact.mass:.4g} kg, which inertia="exact" gives'
+            yield "mesh", meshes[0].words if meshes else Setting("a mesh"), made
 
     def _changed(self, name: str, made: str) -> tuple[str, Setting, str]:
         """A quantity that the compiler changes, with what is written, and the setting that changes it."""

@@ -186,7 +186,7 @@ class PyBulletBody(LooseBody):
             falls=Drag(kappa * mass, kappa * mass),
             surface=SURFACE if parts else "",
             friction=touching.dynamics[1] * plane[1],
-            restitution=touching.restitution * plane[5],
+            restitution=touching.restitution * plane[5] if touching.dynamics[9] < 0.0 else None,  # a spring and damper have none
             margin=margin,
             rolling=touching.dynamics[6] > 0.0,
             rest_depth=SLOP - margin if touching.dynamics[9] < 0.0 else math.nan,

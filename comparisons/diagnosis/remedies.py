@@ -82,8 +82,9 @@ def _explained(body: LooseBody, finding: Finding, effect: Callable[[frozenset[st
 
 
 def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable[[tuple[str, ...], float], list[Answer]]) -> Finding:
-    """A finding with the changes that remove it, each with the value measured with it; the finding is then of the first one's settings."""
+    """A finding with the changes that remove it, each with the value measured with it; the finding is then of what the first one changes."""
     found: dict[tuple[str, ...], Remedy] = {}
+    changed: set[str] = set()
     for settings, step in _tries(body, answer, finding):
         changes = body.changes(settings)
         if settings in found or (len(settings) > 1 and found) or body.patch(changes, step) in {one.text for one in found.values()}:
@@ -91,10 +92,13 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
         for other in again(settings, step):
             if not any(one.is_error == finding.is_error or body.facts.unknown for one in other.findings):
                 found[settings] = Remedy(body.patch(changes, step), other.measured, other.unit, *body.elsewhere(step, changes))
+                changed = changed or {*changes, *["timestep"] * (step != body.facts.dt)}
     if not found:
         return finding
     kind: Kind = "setting" if finding.kind == "model" and () not in found else finding.kind
     settings = finding.settings if finding.shares else next(iter(found)) or ("timestep",)
+    if finding.is_error:
+        settings = tuple(name for name in finding.settings if name in changed)
     return finding._replace(kind=kind, settings=settings, remedies=tuple(found.values()))
 
 

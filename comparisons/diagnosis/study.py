@@ -8,6 +8,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
+import numpy as np
+
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, Answer, Finding
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble, worst_tumble
 from dropspin.comparisons.diagnosis.friction import creep, roll, slide
@@ -15,6 +17,7 @@ from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.remedies import Question, Targets, answers_to
 from dropspin.comparisons.diagnosis.source import Setting
+from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.running.entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
@@ -30,9 +33,9 @@ if TYPE_CHECKING:  # each engine is imported in its own process alone
 
 READERS = {".xml": ("mujoco",), ".mjcf": ("mujoco",), ".urdf": ("mujoco", "pybullet"), ".obj": ("mujoco",), ".stl": ("mujoco",)}
 """The engines that read a file, by its ending."""
-MESH = """<mujoco><asset><mesh name="mesh" file="{path}"/></asset><worldbody><geom type="plane" size="0 0 1"/>
+MESH = """<mujoco><asset><mesh name="mesh" file="{path}" inertia="{inertia}"/></asset><worldbody>
 <body name="{name}"><freejoint/><geom type="mesh" mesh="mesh" density="{density:g}"/></body></worldbody></mujoco>"""
-"""A model with a body whose only geometry is a mesh, above a plane."""
+"""A model with a body whose only geometry is a mesh."""
 Found = TypeVar("Found")
 OF_FACTS = ("name", "engine", "version", "dt", "mass", "surface", "friction")
 """What a diagnosis has as an engine has it in force."""
@@ -138,14 +141,19 @@ def diagnose(
     chosen = [engines] if isinstance(engines, str) else list(engines) or list(READERS[ending])
     for engine in chosen:
         if engine not in READERS[ending]:
+            if engine_name(engine) in READERS[ending]:
+                raise DropspinError(f"{engine}: diagnose takes an engine without options; settings are those of the file, or its defaults.")
             raise DropspinError(f"{engine} does not read {ending} files; use {' or '.join(READERS[ending])}.")
     with tempfile.TemporaryDirectory() as folder:
         if ending in (".obj", ".stl"):
-            if not is_closed(*read_mesh(path, given)):
+            points, faces = read_mesh(path, given)
+            if not is_closed(points, faces):
                 raise DropspinError(
                     f"{given}: the mesh is not closed, so that it has no volume; close it, or give the body in an MJCF file."
                 )
-            text = MESH.format(path=path.resolve(), name=path.stem, density=density)
+            is_inside_out = np.linalg.det(points[faces]).sum() < 0.0  # of which MuJoCo refuses the exact volume
+            inertia_of = "legacy" if is_inside_out else "exact"
+            text = MESH.format(path=path.resolve(), inertia=inertia_of, name=path.stem, density=density)
             path = Path(folder, "mesh.xml")
             path.write_text(text, encoding="utf-8")
         entries = [present_entry(engine) for engine in chosen]

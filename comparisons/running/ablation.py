@@ -37,7 +37,8 @@ def shares(error: Callable[[Reverted], float], changed: Sequence[str]) -> dict[t
 
     Returns:
         The share of one setting, and that which a second one adds to it; or of two together, by both names, where their own shares do not
-        add up. Where the sum is above 1, these are alternatives. Empty if no one or two of them explain nine tenths of the error.
+        add up. Where the sum is above 1, these are alternatives, unless a share is negative: that setting reduces the error. Empty if no
+        one or two of them explain nine tenths of the error.
     """
     error = cache(error)
     whole, calibrated = error(frozenset()), error(frozenset(changed))
@@ -45,28 +46,32 @@ def shares(error: Callable[[Reverted], float], changed: Sequence[str]) -> dict[t
         return {}
 
     def share(*names: str) -> float:
-        left = abs(error(frozenset(names)) - calibrated) / abs(whole - calibrated)
-        return 1.0 - left if left < math.inf else -math.inf
+        left = (error(frozenset(names)) - calibrated) / (whole - calibrated)
+        return 1.0 - left if math.isfinite(left) else -math.inf
+
+    def explained(*names: str) -> float:
+        """The part of the error that reverting them takes away, also where an error of the other sign is left."""
+        return 1.0 - abs(1.0 - share(*names))
 
     single = {name: share(name) for name in changed}
-    enough: dict[tuple[str, ...], float] = {(name,): of_it for name, of_it in single.items() if of_it >= ENOUGH}
+    enough: dict[tuple[str, ...], float] = {(name,): of_it for name, of_it in single.items() if explained(name) >= ENOUGH}
     if len(enough) == 1:
         [(first,)] = enough
-        is_all = 1.0 - single[first] < NOTEWORTHY
-        added = {} if is_all else {(name,): share(first, name) - single[first] for name in changed if name != first}
-        second = max(added, key=lambda name: added[name], default=())
-        return enough | {name: more for name, more in added.items() if name == second and more >= NOTEWORTHY}
+        is_all = 1.0 - explained(first) < NOTEWORTHY
+        more = {name: explained(first, name) - explained(first) for name in changed if name != first and not is_all}
+        second = max(more, key=lambda name: more[name], default=first)
+        return enough | ({(second,): share(first, second) - single[first]} if more.get(second, 0.0) >= NOTEWORTHY else {})
     if enough:
         return enough
     beside = {name: 1.0 - share(*(other for other in changed if other != name)) for name in changed}
     mattering = [name for name in changed if max(abs(single[name]), abs(beside[name])) >= NOTEWORTHY]
     pairs: list[tuple[str, ...]] = list(combinations(mattering, 2))
-    most = max((share(*pair) for pair in pairs), default=0.0)
-    best = {pair: share(*pair) for pair in pairs if share(*pair) >= max(ENOUGH, most - ADDITIVE)}
+    most = max((explained(*pair) for pair in pairs), default=0.0)
+    best = {pair: share(*pair) for pair in pairs if explained(*pair) >= max(ENOUGH, most - ADDITIVE)}
     if len(best) == 1:
         [pair] = best
         of_each: dict[tuple[str, ...], float] = {(name,): single[name] for name in pair}
-        if min(of_each.values()) >= NOTEWORTHY and abs(sum(of_each.values()) - most) <= ADDITIVE:
+        if min(map(abs, of_each.values())) >= NOTEWORTHY and abs(sum(of_each.values()) - best[pair]) <= ADDITIVE:
             return of_each
     return best
 

@@ -82,7 +82,7 @@ def _explained(body: LooseBody, finding: Finding, effect: Callable[[frozenset[st
 
 
 def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable[[tuple[str, ...], float], list[Answer]]) -> Finding:
-    """A finding with the changes that remove it, each with the value measured with it; the finding is then of what the first one changes."""
+    """A finding with the changes that remove it, each with the value measured; the finding is then of what the first one changes."""
     found: dict[tuple[str, ...], Remedy] = {}
     changed: set[str] = set()
     for settings, step in _tries(body, answer, finding):

@@ -17,8 +17,10 @@ body, n' = dn/dt, and c for the farthest of its points, the height of all its po
 
 where v is the velocity of the point that is lowest now.
 
-The height of a corner that is on the floor at the start is the integral of its upward velocity, at first by Gauss–Legendre quadrature, so
-that it is as accurate as the velocity is, relative to the height: flights that last a millionth of those before lose no digits.
+The height of a corner that is on the floor at the start is computed from the integrals of v_y and n', at first by Gauss–Legendre
+quadrature, so that it is as accurate as these are, relative to the height: flights that last a millionth of those before lose no digits.
+The depth has changed by  |S n| - |S n₀| = S (n - n₀) · S (n + n₀) / (|S n| + |S n₀|),  which also holds where a disc passes its level
+position, at which the derivative of the depth jumps.
 
 Source: interval exclusion by Taylor's theorem with Lagrange's remainder; Euler's equations for |α|; C. F. Gauss (1814) for the quadrature.
 Valid for: undamped flight. The search ends without a contact time in two cases: a corner comes within rounding of the floor without clearly
@@ -201,14 +203,28 @@ class ContactSearch:
         """Heights above the floor [m], upward velocities [m/s] and rounding errors of the heights [m] at a time [s], each of shape (n,)."""
         largest_spin = self.flight.rotor.largest_spin
         integrates = bool(self._starts_on_floor.any()) and now * largest_spin <= 2.0 * FIRST_ANGLE
-        heights, speeds = self._corners(np.append(0.5 * now * (1.0 + NODES), now) if integrates else np.array([now]))
+        times = np.append(0.5 * now * (1.0 + NODES), now) if integrates else np.array([now])
+        heights, speeds = self._corners(times)
         rounding = np.full(len(self.points), self._tolerance(np.array([now]))[0])
         if integrates:
-            risen = 0.5 * now * (WEIGHTS @ speeds[:-1])
+            risen, error = (0.5 * now * (WEIGHTS @ speeds[:-1]), 0.0) if self._is_ball else self._risen(times)
             fastest = abs(self.flight.start[VELOCITY][1]) + now * abs(self._gravity) + self._reach * largest_spin
             heights[-1] = np.where(self._starts_on_floor, risen, heights[-1])
-            rounding = np.where(self._starts_on_floor, SPEED_ROUNDING * fastest * now, rounding)
+            rounding = np.where(self._starts_on_floor, SPEED_ROUNDING * fastest * now + error, rounding)
         return heights[-1], speeds[-1], rounding
+
+    def _risen(self, times: Array) -> tuple[Array, float]:
+        """How far points about the corners have risen since the start [m], shape (n,), at the last time, and the error of the depth [m].
+
+        The other times are the nodes of the quadrature.
+        """
+        _, speed, vertical, turning = self._vertical_motion(times)
+        first, last, turned = unrotate(self.flight.start[ORIENTATION], UP), vertical[-1], 0.5 * times[-1] * (WEIGHTS @ turning[:-1])
+        lengths = float(np.linalg.norm(self.semi_axes * first) + np.linalg.norm(self.semi_axes * last))
+        moved = self.semi_axes * turned
+        deeper = float(moved @ (self.semi_axes * (first + last))) / lengths
+        error = ATTITUDE_ROUNDING * float(np.linalg.norm(moved)) * self._reach / lengths
+        return 0.5 * times[-1] * float(WEIGHTS @ speed[:-1]) + self.points @ turned - deeper, error
 
     def _corners(self, times: Array) -> tuple[Array, Array]:
         """Heights above the floor [m] and upward velocities [m/s] of the corners, shapes (m, n), at times [s], shape (m,)."""

@@ -2,8 +2,8 @@
 
     ω(t) = ω₀ - α t,   φ(t) = ω₀ t - α t²/2,   α = f M g ρ / I     until it stops at t = ω₀/α
 
-ρ is the distance of the corners of the base from the axis. If opposite corners carry equal loads, friction has this moment and no resultant
-force.
+ρ is the distance of the corners of the base from the axis. If the centre of mass is above the middle of the base, the corners carry equal
+loads, and friction has this moment and no resultant force. If the vertical is a principal axis, the turn does not change the loads.
 
 A tilt θ about the horizontal axes 1 and 2 changes the loads of the corners. The friction of these loads has a moment about the centre of
 mass, at the height h, that is perpendicular to the moment of the loads and b = f h/ρ times as large. With I_1, I_2 the moments of inertia
@@ -16,9 +16,9 @@ contacts without restitution suppress the flutter.
 
 Source: C. A. de Coulomb, Théorie des machines simples (1785); Euler's equation about a principal axis; V. V. Bolotin, Nonconservative
 Problems of the Theory of Elastic Stability (1963), for the flutter by forces that are not symmetric.
-Valid for: a box flat on the floor at the start, turning about the vertical and not moving otherwise; a Coulomb coefficient above 0; gravity
-straight down, no damping. The corners touch the floor, not the face between them. With restitution, valid only if there is no flutter;
-restitution then has no effect, because no contact separates.
+Valid for: a box flat on the floor at the start, with its centre of mass above the middle of its base, turning about the vertical, a
+principal axis, and not moving otherwise; a Coulomb coefficient above 0; gravity straight down, no damping. The corners touch the floor, not
+the face between them. With restitution, valid only if there is no flutter; restitution then has no effect, because no contact separates.
 """
 
 import math
@@ -26,11 +26,15 @@ import math
 import numpy as np
 
 from dropspin.scenarios.bodies import Box
+from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import about, multiply, unrotate
 from dropspin.scenarios.state import ORIENTATION, UP, VELOCITY, Array
 from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.truths.truth import Truth
+
+CENTRED = 1e-9
+"""Share of the size, or of the moments of inertia, up to which a difference is one of rounding."""
 
 
 def coulomb_turn(scene: Scenario, floor: Floor) -> Truth | None:
@@ -60,16 +64,22 @@ def coulomb_turn(scene: Scenario, floor: Floor) -> Truth | None:
 
 
 def _lever(scene: Scenario) -> float | None:
-    """Distance of the base's corners from the vertical through the centre of mass [m]; None if the box does not lie flat."""
+    """Distance of the base's corners from the axis [m]; None if the box does not lie flat, or its corners carry unequal loads."""
     if not isinstance(scene.body, Box) or not scene.starts_on_floor:
         return None
     base = scene.body.lowest(np.array(scene.start.orientation), TOUCHING)
-    return float(np.hypot(base[:, 0], base[:, 2]).mean()) if len(base) == 4 else None
+    vertical = unrotate(np.array(scene.start.orientation), UP)
+    wobble = np.cross(vertical, scene.body.inertia_tensor @ vertical)
+    is_even = len(base) == 4 and np.abs(base.mean(axis=0)[[0, 2]]).max() <= CENTRED * scene.body.size
+    is_principal = np.abs(wobble).max() <= CENTRED * np.trace(scene.body.inertia_tensor)
+    return float(np.hypot(base[:, 0], base[:, 2]).mean()) if is_even and is_principal else None
 
 
 def _flutters(scene: Scenario, friction_over_lever: float) -> bool:
-    """Whether the loads of the corners oscillate with growing amplitude unless impacts damp the oscillation."""
+    """Whether the loads of the corners may oscillate with growing amplitude unless impacts damp the oscillation."""
     assert isinstance(scene.body, Box)
+    if not is_diagonal(scene.body.inertia_tensor):
+        return True  # the equations are about the principal axes, along which the corners are not
     upright = int(np.argmax(np.abs(unrotate(np.array(scene.start.orientation), UP))))
     first, second = (axis for axis in range(3) if axis != upright)
     squares, moments = np.square(scene.body.half_extents), np.diag(scene.body.inertia_tensor)

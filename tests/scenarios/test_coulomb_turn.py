@@ -8,6 +8,7 @@ from dropspin.scenarios import load, truth_for
 from dropspin.scenarios.rotations import rotate
 
 HALF = np.array([0.3, 0.1, 0.2])
+BOX = {"shape": "box", "half_extents": HALF.tolist(), "mass": 2.0, "inertia": [0.038, 0.06, 0.058]}
 
 
 def turning(spin=(0.0, -8.0, 0.0), orientation=(0.0, 0.3, 0.0, 0.9), height=0.1, friction=0.3, **more):
@@ -15,7 +16,7 @@ def turning(spin=(0.0, -8.0, 0.0), orientation=(0.0, 0.3, 0.0, 0.9), height=0.1,
         {
             "name": "turning",
             "duration": 1.0,
-            "body": {"shape": "box", "half_extents": HALF.tolist(), "mass": 2.0, "inertia": [0.038, 0.06, 0.058]},
+            "body": BOX,
             "start": {"position": [1.0, height, 2.0], "orientation": list(orientation), "angular_velocity": list(spin)},
             "gravity": {"acceleration": [0.0, -9.8, 0.0]},
             "floor": {"restitution": 0.4, "friction": friction},
@@ -53,10 +54,12 @@ def test_energy_lost_is_the_work_of_friction_at_the_corners(upright, moment, dir
         {"orientation": (0.1, 0.0, 0.0, 1.0), "height": 0.3},
         {"damping": {"angular": 0.1}},
         {"body": {"shape": "sphere", "radius": 0.1, "mass": 2.0}},
+        {"body": BOX | {"center_of_mass": [0.05, 0.0, 0.0]}},
+        {"body": BOX | {"inertia": [[0.038, 0.004, 0.0], [0.004, 0.06, 0.0], [0.0, 0.0, 0.058]]}},
     ],
 )
 def test_turn_is_limited_to_its_range_of_validity(change):
-    """Not with sticking, a fall, another spin, rest, a tilt, damping or a ball."""
+    """Not with sticking, a fall, another spin, rest, a tilt, damping or a ball; nor if the corners carry unequal loads."""
     truth = truth_for(turning(**change))
     assert truth is None or truth.name != "coulomb-turn"
 

@@ -5,6 +5,7 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from dropspin.scenarios import SceneError, Trajectory, load, truth_for
 from dropspin.scenarios.bodies import SHAPES
@@ -348,3 +349,53 @@ def test_an_impact_of_any_round_body_keeps_energy_at_restitution_one():
                 axes = rotate(state[3:7], np.eye(3))
                 energies.append(0.5 * one.body.mass * state[7:10] @ state[7:10] + 0.5 * (axes @ spin) @ inertia @ (axes @ spin))
             assert energies[1] == pytest.approx(energies[0], rel=1e-12)
+
+
+def planar_impacts(radius, half, tilt, height, restitution, count):
+    """The times of the impacts of a cylinder that turns in the plane of its axis, without friction: roots of closed-form heights."""
+    inertia = 0.25 * radius**2 + half**2 / 3.0  # over the mass
+    now, y, v, angle, spin, times = 0.0, height, 0.0, tilt, 0.0, []
+    while len(times) < count:
+
+        def gap(s, start=(y, v, angle, spin)):
+            turned = start[2] + start[3] * s
+            return start[0] + start[1] * s - 0.5 * G * s * s - half * np.abs(np.cos(turned)) - radius * np.abs(np.sin(turned))
+
+        steps = 1e-9 + np.arange(0.0, 0.5, 1e-6)
+        first = steps[np.argmax((gap(steps) < 0.0) & (np.gradient(gap(steps)) < 0.0))]
+        s = brentq(gap, first - 1e-6, first, xtol=1e-15)
+        now, y, angle, v = now + s, y + v * s - 0.5 * G * s * s, angle + spin * s, v - G * s
+        across, along = math.copysign(radius, -math.sin(angle)), math.copysign(half, -math.cos(angle))
+        arm = across * math.cos(angle) - along * math.sin(angle)  # of the lowest corner, along x
+        push = -(1.0 + restitution) * (v + spin * arm) / (1.0 + arm**2 / inertia)
+        v, spin = v + push, spin + push * arm / inertia
+        times.append(now)
+    return times
+
+
+@pytest.mark.parametrize("half", [0.05, 0.03, 0.01])
+def test_flat_cylinders_that_clatter_strike_with_one_rim_and_then_with_the_other(half):
+    tilt = 0.1
+    flat = {"shape": "cylinder", "radius": R, "half_length": half, "mass": 1.0}
+    orientation = [0.0, 0.0, math.sin(0.5 * tilt), math.cos(0.5 * tilt)]
+    events = truth_for(scene(flat, duration=0.5, position=[0.0, 0.3, 0.0], orientation=orientation)).events[:5]
+    assert [event.time for event in events] == pytest.approx(planar_impacts(R, half, tilt, 0.3, 0.5, 5), abs=1e-11)
+
+
+@pytest.mark.sample(4)
+@pytest.mark.parametrize("seed", range(24))
+def test_no_flat_body_passes_through_the_floor(seed):
+    random = np.random.default_rng(seed)
+    half, tilt, friction = R * random.choice([0.02, 0.1, 0.3, 0.6, 1.0]), random.uniform(0.05, 1.2), ["none", "infinite", 0.3][seed % 3]
+    flat = {"shape": "cylinder", "radius": R, "half_length": half, "mass": 1.0}
+    flat = flat if seed % 2 else {"shape": "ellipsoid", "half_extents": [R, half, 0.9 * R], "mass": 1.0}
+    axis = random.uniform(0.0, 2.0 * math.pi)
+    turned = about(np.array([math.cos(axis), 0.0, math.sin(axis)]), np.array(tilt)).tolist()
+    spin = (2.0 * random.normal(size=3)).tolist()
+    one = scene(flat, friction, duration=0.5, position=[0.0, 0.4, 0.0], orientation=turned, angular_velocity=spin)
+    truth = truth_for(one)
+    assert truth.events
+    assert lowest_height(one, truth(np.linspace(0.0, truth.horizon, 5000))).min() > -1e-12
+    for event in truth.events:
+        at_impact = lowest_height(one, Trajectory.from_states(np.zeros(1), event.before[np.newaxis]))
+        assert abs(at_impact[0]) < 1e-12

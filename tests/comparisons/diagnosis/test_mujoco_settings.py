@@ -7,11 +7,11 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from support.model_files import FREE, body_of, by_quantity, findings_of, ladder
 
-from dropspin.comparisons.diagnosis.answers import DECAY_TIME
+from dropspin.comparisons.diagnosis.answers import DECAY_TIME, REBOUND
 from dropspin.comparisons.diagnosis.flight import fall, spin
 from dropspin.comparisons.diagnosis.friction import slide
 from dropspin.comparisons.diagnosis.inertia import inertia
-from dropspin.comparisons.diagnosis.landing import rest
+from dropspin.comparisons.diagnosis.landing import IMPACTS, impact, rest
 from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
 from dropspin.comparisons.diagnosis.remedies import answers_to
 from dropspin.scenarios.truths.settings import time_constant
@@ -216,3 +216,79 @@ def test_floor_that_collides_with_nothing_is_told_from_the_plane_that_is_added(t
     facts = MuJoCoModel(tmp_path / "model.xml", "model.xml").body("b", None).facts
     assert facts.surface == "a plane with default settings"
     assert facts.missed == "hidden does not hold it, because no geometry of the body collides with it"
+
+
+def rebound_of_a_spring(stiffness, damping, impedance, speed, gravity=9.81):
+    """The rebound over the impact speed of a mass on MuJoCo's contact of constant impedance, whose force only pushes."""
+
+    def moving(_, state):
+        pushes = gravity - (damping * state[1] + stiffness * state[0]) / impedance
+        return [state[1], -gravity + max(0.0, impedance * pushes)]
+
+    def leaves(_, state):
+        return state[0]
+
+    leaves.terminal, leaves.direction = True, 1.0
+    return solve_ivp(moving, (0.0, 3.0), [0.0, -speed], events=leaves, rtol=1e-10, atol=1e-12).y_events[0][0][1] / speed
+
+
+@pytest.mark.parametrize("speed", [1.0, 3.0])
+def test_impact_that_lasts_half_a_second_is_watched_to_its_end(tmp_path, speed):
+    soft = '<geom type="sphere" size=".1" mass="1" solref="-50 -2" solimp=".95 .95 .001 .5 2" priority="1"/>'
+    body = body_of(tmp_path, FREE.format(soft), 'timestep="0.0005"')
+    [of_speed] = [answer for answer in impact(body, ladder(body)) if answer.quantity == REBOUND and answer.speed == speed]
+    assert of_speed.measured == pytest.approx(rebound_of_a_spring(50.0, 2.0, 0.95, speed), rel=0.02)
+
+
+def test_body_that_passes_through_a_thin_table_has_no_rebound(tmp_path):
+    table = '<geom name="table" type="box" size=".2 .2 .002" pos="0 0 .1"/>'
+    coin = FREE.replace('pos="0 0 1"', 'pos="0 0 .11"').format('<geom type="cylinder" size=".01 .001" density="7800"/>')
+    body = body_of(tmp_path, table + coin, on="table")
+    through = [(answer, found) for answer, found in findings_of(body, impact) if answer.quantity == REBOUND]
+    assert [answer.speed for answer, _ in through] == list(IMPACTS)
+    for answer, found in through:
+        assert math.isnan(answer.measured)
+        assert answer.detail == "none"
+        assert "passes through the surface" in found.detail
+
+
+def bracket(inertia):
+    """An L of 0.02 m by 0.02 m bars of 0.2 m, as a mesh of water, with a key for its inertia."""
+    outline = [(0, 0), (0.2, 0), (0.2, 0.02), (0.02, 0.02), (0.02, 0.2), (0, 0.2)]
+    vertices = [f"{x} {y} {z}" for z in (-0.01, 0.01) for x, y in outline]
+    faces = [(0, n + 1, n) for n in range(1, 5)] + [(6, 6 + n, 7 + n) for n in range(1, 5)]
+    faces += [face for n in range(6) for m in [(n + 1) % 6] for face in ((n, m, m + 6), (n, m + 6, n + 6))]
+    faces_text = " ".join(numbers(face) for face in faces)
+    mesh = f'<asset><mesh name="L" {inertia} vertex="{" ".join(vertices)}" face="{faces_text}"/></asset>'
+    return mesh, FREE.format('<geom type="mesh" mesh="L" density="1000"/>')
+
+
+def test_mesh_of_which_parts_are_counted_twice_is_named(tmp_path):
+    mass = 1000.0 * 0.02 * (0.2 * 0.02 + 0.18 * 0.02)
+    head, world = bracket("")
+    [(name, setting, made)] = body_of(tmp_path, world, head=head).facts.ignored
+    assert name == "mesh"
+    assert setting.line == 1
+    assert f"its volume has {mass:.4g} kg" in made
+    head, world = bracket('inertia="exact"')
+    facts = body_of(tmp_path, world, head=head).facts
+    assert facts.mass == pytest.approx(mass, rel=1e-6)
+    assert facts.ignored == []
+
+
+@pytest.mark.parametrize(("condim", "named"), [(3, ["torsional", "rolling"]), (4, ["rolling"]), (6, [])])
+def test_friction_that_the_dimension_of_a_contact_leaves_out_is_named(tmp_path, condim, named):
+    ball = f'<geom type="sphere" size=".1" mass="1" condim="{condim}" friction="1 .1 .1"/>'
+    found = [made for name, _, made in body_of(tmp_path, FREE.format(ball)).facts.ignored if name == "friction"]
+    assert len(found) == bool(named)
+    assert all(f"{name} friction needs condim" in found[0] for name in named)
+    plain = FREE.format(ball.replace(' friction="1 .1 .1"', ' friction="1 .005 .0001"'))
+    assert body_of(tmp_path, plain).facts.ignored == []
+
+
+def test_settings_of_a_slide_are_all_that_the_remedy_changes(tmp_path):
+    box = '<geom type="box" size=".05 .05 .05" mass=".3" solref="-2500 -100"/>'
+    body = body_of(tmp_path, FREE.format(box), 'timestep="0.01"')
+    [found] = [found for answer, found in findings_of(body, slide) if answer.direction == "45°"]
+    assert found.settings == ("cone", "impratio", "timestep")
+    assert 'timestep="0.0013" cone="elliptic" impratio="10"' in found.remedies[0].text

@@ -278,3 +278,9 @@ def test_a_ball_rolls_and_has_no_row_of_slides(tmp_path):
     assert slide(ball, DTS) == []
     assert creep(ball, DTS) == []
     assert [answer.quantity for answer in roll(ball, DTS)] == ["fraction kept in 1 s"]
+
+
+def test_a_contact_with_stiffness_and_damping_has_no_exact_rebound(tmp_path):
+    soft = "<contact><stiffness value='1000'/><damping value='10'/></contact>"
+    assert body(tmp_path, link(BALL, extra=soft)).facts.restitution is None
+    assert body(tmp_path, link(BALL)).facts.restitution == 0.0

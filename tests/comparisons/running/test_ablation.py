@@ -109,3 +109,10 @@ def test_run_states_the_settings_that_explain_a_failure():
         "drop-ball: floor_restitution=0 explains 97.9 % of the bounce height error at 2 ms, and linearDamping=0.04 2.05 %."
     ]
     assert settings_of(results, "pybullet") == []
+
+
+def test_settings_that_act_against_each_other_have_shares_of_both_signs():
+    """An error of 1 of which one setting makes 1.04, and another takes 0.04 away."""
+    parts = {"density": 1.04, "integrator": -0.04, "other": 0.0}
+    found = shares(lambda reverted: sum(part for name, part in parts.items() if name not in reverted), list(parts))
+    assert found == {("density",): pytest.approx(1.04), ("integrator",): pytest.approx(-0.04)}

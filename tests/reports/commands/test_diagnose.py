@@ -61,6 +61,7 @@ def test_one_body_has_its_answers_and_a_missed_target_fails(model):
         (["none.xml"], "none.xml: No such file"),
         (["."], "is not a model file"),
         (["two.xml", "-e", "wang"], "wang does not read .xml files; use mujoco"),
+        (["two.xml", "-e", "mujoco[cone=elliptic]"], "mujoco[cone=elliptic]: diagnose takes an engine without options"),
         (["two.xml", "--body", "heavi"], "heavy"),
         (["two.xml", "--on", "flor"], "floor"),
         (["two.xml", "--body", "heavy", "--on", "geom 4"], "neither a plane nor a box"),

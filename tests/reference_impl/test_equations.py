@@ -13,7 +13,7 @@ from dropspin.reference_impl.contacts.mean import apply_impulse
 from dropspin.reference_impl.contacts.response import impulse_response
 from dropspin.reference_impl.laws import note
 from dropspin.reference_impl.parameters import pack, read_body
-from dropspin.reference_impl.quaternion import normalise, product, rotation_matrix
+from dropspin.reference_impl.quaternion import from_matrix, normalise, product, rotation_matrix
 from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, cross, cross_matrix, dot, solve
 
 numbers = st.floats(-3, 3, allow_subnormal=False)
@@ -138,3 +138,14 @@ def test_restitution_is_0_below_the_rest_speed():
     assert slow.y == pytest.approx(0.0, abs=EPS)
     assert fast.y == pytest.approx(0.055, rel=1e-14)
     assert dot(fast, Vec3(1.0, 0.0, 1.0)) == 0.0
+
+
+@pytest.mark.parametrize("largest", range(4))
+def test_quaternion_of_a_rotation_matrix_is_exact_whichever_component_is_the_largest(largest):
+    rng = np.random.default_rng(largest)
+    for _ in range(20):
+        q = rng.uniform(-0.5, 0.5, 4)
+        q[largest] = 1.0
+        q /= np.linalg.norm(q)
+        found = np.array(from_matrix(rotation_matrix(quat(q))))
+        np.testing.assert_allclose(np.sign(found @ q) * found, q, rtol=0, atol=4 * EPS)

@@ -103,6 +103,15 @@ def test_times_outside_the_horizon_are_rejected():
         truth_for(ball())([3.1])
 
 
+def test_a_later_origin_of_time_ends_the_solution_as_much_earlier():
+    truth = truth_for(ball())
+    later = truth.after(0.25)
+    assert later.horizon == truth.horizon - 0.25
+    assert [event.time for event in later.events] == [event.time - 0.25 for event in truth.events]
+    t = np.array([0.0, 0.3, 2.0])
+    np.testing.assert_array_equal(later(t).states, truth(t + 0.25).states)
+
+
 @pytest.mark.parametrize("height", [0.0, 1e-17, 5e-11])
 def test_ball_within_rounding_of_the_floor_rests_on_it(height):
     """At restitution 1 it does not bounce a nanometre high a billion times."""

@@ -88,3 +88,10 @@ def test_a_point_at_rest_starts_if_the_pull_exceeds_friction(friction, velocity)
     assert np.linalg.norm(speeds[0]) == pytest.approx(velocity, rel=1e-15)
     assert np.linalg.norm(ways[0]) == pytest.approx(0.5 * velocity, rel=1e-15)
     assert stops == (math.inf if velocity else 0.0)
+
+
+def test_without_friction_the_velocity_grows_with_time():
+    pull, t = np.array([1.0, 0.0, 0.5]), np.array([0.0, 0.5, 3.0])
+    speeds, ways = dry_friction(START, pull, 0.0)[0](t)
+    np.testing.assert_allclose(speeds, START + np.outer(t, pull), rtol=1e-15)
+    np.testing.assert_allclose(ways, np.outer(t, START) + 0.5 * np.outer(t**2, pull), rtol=1e-15)

@@ -10,6 +10,7 @@ from dropspin.comparisons.logs.log import load_log
 from dropspin.scenarios import SceneError, load, reference_for, truth_for
 from dropspin.scenarios.loading import CATALOGUE
 from dropspin.scenarios.state import ORIENTATION, POSITION, VELOCITY
+from dropspin.scenarios.truths.measured import measured
 from dropspin.scenarios.variations import changed
 
 
@@ -50,6 +51,15 @@ def test_reference_is_the_recorded_pose_in_each_frame_and_no_exact_solution():
     np.testing.assert_allclose(between[VELOCITY], (toss.position[4] - toss.position[3]) / (toss.t[4] - toss.t[3]))
     later = truth.after(-0.001)
     np.testing.assert_allclose(later(later.frames).position, toss.position, atol=1e-12)
+
+
+def test_the_sign_of_a_recorded_quaternion_has_no_meaning():
+    recording = load("toss-cube").recording
+    toss = recording.tosses[0]
+    signs = np.where(np.arange(len(toss.t)) % 3 == 1, -1.0, 1.0)[:, np.newaxis]
+    flipped = measured(recording, toss.model_copy(update={"orientation": signs * toss.orientation}))
+    t = np.linspace(0.0, toss.t[-1], 40)
+    np.testing.assert_allclose(flipped(t).states, measured(recording, toss)(t).states, rtol=0, atol=1e-12)
 
 
 def test_one_toss_is_chosen_by_name_and_changes_the_digest(files):

@@ -30,12 +30,14 @@ def with_table(folder, table, before=""):
 
 @pytest.mark.extended
 def test_catalogue_has_every_fifth_toss_of_the_shipped_recording():
+    """The frames are those of the recording. The starts are estimates, which the scene keeps: newer ones are within the uncertainty."""
     shipped, made = load("toss-cube").recording, toss_cube_scene.chosen(load_log("toss-cube"))
     assert [toss.name for toss in shipped.tosses] == [toss.name for toss in made.tosses]
     for one, other in zip(shipped.tosses, made.tosses, strict=True):
         for name in ("t", "position", "orientation"):
             np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=0.0, atol=1e-6)
-        np.testing.assert_allclose(one.starts[0], other.starts[0], rtol=0.0, atol=1e-6)  # drawn ones depend on the signs of eigenvectors
+        uncertainty = np.std(one.starts[1:], axis=0)  # of the starts that are drawn as the flight leaves them open
+        assert (np.abs(np.subtract(one.starts[0], other.starts[0])) <= 0.1 * uncertainty).all()
 
 
 def test_reference_is_the_recorded_pose_in_each_frame_and_no_exact_solution():

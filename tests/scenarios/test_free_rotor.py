@@ -154,3 +154,19 @@ def test_spin_about_a_principal_axis_is_steady():
     still, w = principal_spin(TILTED, np.zeros(3))(np.array([5.0]))
     np.testing.assert_array_equal(still[0], TILTED)
     np.testing.assert_array_equal(w[0], 0.0)
+
+
+@pytest.mark.parametrize("spin", [(0.3, 2.0, 0.1), (2.0, 0.4, 0.3), (0.1, 0.3, 2.0)])
+def test_largest_spin_is_the_greatest_speed(spin):
+    rotor = free_rotor(np.diag([0.02, 0.05, 0.04]), np.array([0.0, 0.0, 0.0, 1.0]), np.array(spin))
+    speeds = np.linalg.norm(rotor(np.linspace(0.0, 60.0, 40_001))[1], axis=1)  # of many periods
+    assert rotor.largest_spin == pytest.approx(speeds.max(), rel=1e-6)
+    assert rotor.largest_spin >= speeds.max() * (1.0 - 1e-14)
+
+
+def test_many_times_at_once_are_those_of_parts():
+    rotor = free_rotor(np.diag([0.02, 0.05, 0.04]), np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 2.0, 0.1]))
+    t = np.linspace(0.0, 5.0, 40_001)
+    together, parts = rotor(t), [rotor(part) for part in np.array_split(t, 7)]
+    for whole, several in zip(together, zip(*parts, strict=True), strict=True):
+        np.testing.assert_allclose(whole, np.concatenate(several), rtol=0, atol=1e-14)

@@ -75,7 +75,8 @@ def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
         "(Newton's restitution)"
     )
     if u0 == 0.0:
-        statement = "the body rests on the floor and turns about the vertical at the constant angular velocity ω, by the angle ω t"
+        stays = "slides on the floor at a constant velocity" if start[7] or start[9] else "rests on the floor"
+        statement = f"the body {stays} and turns about the vertical at the constant angular velocity ω, by the angle ω t"
     return Truth("bounce-ladder", statement, states, impacts_of(times, before, after), until, TURNS_OVER if until < scene.duration else "")
 
 
@@ -107,8 +108,8 @@ def _stays_flat(scene: Scenario, floor: Floor) -> bool:
     start = scene.start
     if floor.friction != "none" and (start.velocity[0] or start.velocity[2] or any(start.angular_velocity)):
         return False
-    if scene.body.is_ball:
-        return scene.body.inertia == "solid" or not any(start.angular_velocity)
+    if scene.body.is_ball:  # of any inertia: the impulse is through its centre of mass
+        return True
     lowest = scene.body.lowest(np.array(start.orientation), 1e-12)
     under_centre = np.abs(lowest[:, [0, 2]].mean(axis=0)).max() <= 1e-12 * scene.body.size
     is_carried = len(lowest) >= 3 or (bool(scene.body.semi_axes.any()) and _lies(scene))

@@ -166,3 +166,23 @@ def test_a_flat_box_does_not_turn_over_by_rounding(half):
     later = truth_for(scene.starting_at(motion.states[100]))
     assert later is not None
     np.testing.assert_allclose(later([0.05]).position, truth([motion.t[100] + 0.05]).position, atol=1e-12)
+
+
+@pytest.mark.parametrize("inertia", ["surface", [0.003, 0.004, 0.0035]])
+def test_a_spinning_ball_of_any_inertia_bounces_on_a_frictionless_floor_and_turns_as_in_free_flight(inertia):
+    ladder = ball(spin=(3.0, 1.0, -2.0), velocity=(0.4, 0.0, 0.1), duration=2.0)
+    scene = load(ladder.model_dump(exclude_none=True) | {"body": ladder.body.model_dump(exclude_none=True) | {"inertia": inertia}})
+    truth, free = truth_for(scene), truth_for(load(scene.model_dump(exclude_none=True, exclude={"floor"})))
+    assert (truth.name, truth.horizon) == ("bounce-ladder", 2.0)
+    t = np.linspace(0.0, 2.0, 50)
+    found, flying = truth(t), free(t)
+    np.testing.assert_array_equal(found.orientation, flying.orientation)
+    np.testing.assert_array_equal(found.angular_velocity, flying.angular_velocity)
+    np.testing.assert_array_equal(found.position[:, 1], truth_for(ladder)(t).position[:, 1])
+
+
+def test_a_box_that_slides_without_friction_is_not_said_to_rest():
+    box = {"shape": "box", "half_extents": [0.3, 0.1, 0.2], "mass": 1.0}
+    start, floor = {"position": [0.0, 0.1, 0.0], "velocity": [1.0, 0.0, 0.5]}, {"restitution": 0.5, "friction": "none"}
+    scene = load({"duration": 1.0, "body": box, "start": start, "gravity": {"acceleration": [0.0, -9.8, 0.0]}, "floor": floor})
+    assert truth_for(scene).statement.startswith("the body slides on the floor at a constant velocity")

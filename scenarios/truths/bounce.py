@@ -9,8 +9,9 @@ For e < 1 the impacts accumulate at t₀ + (2 u₀ / g) e / (1 - e), Zeno's time
 Source: Newton's law of restitution (Principia, 1687, scholium to the laws); geometric sums.
 Valid for: a ball on a frictionless floor, with any spin and any horizontal motion; a body that lands on a face, or a round body that lands
 where it can lie, such as a capsule on its side, on a frictionless floor, with any horizontal motion and with spin only about the vertical,
-up to rounding; each of these on any floor, if it has no spin and no horizontal motion; gravity straight down, no damping. Valid until a
-difference of one eps in a spin about the intermediate axis can turn the body over.
+up to rounding; each of these on any floor, if it has no spin and no horizontal motion; gravity straight down, no damping. A body that lands
+has the mean of its lowest points under its centre of mass; one that rests has its centre of mass above the inside of its base. Valid until
+a difference of one eps in a spin about the intermediate axis can turn the body over.
 """
 
 import math
@@ -111,9 +112,16 @@ def _stays_flat(scene: Scenario, floor: Floor) -> bool:
     if scene.body.is_ball:  # of any inertia: the impulse is through its centre of mass
         return True
     lowest = scene.body.lowest(np.array(start.orientation), 1e-12)
-    under_centre = np.abs(lowest[:, [0, 2]].mean(axis=0)).max() <= 1e-12 * scene.body.size
+    rests = scene.starts_on_floor and not start.velocity[1]
+    under_centre = np.abs(lowest[:, [0, 2]].mean(axis=0)).max() <= 1e-12 * scene.body.size or (rests and _surrounds_the_centre(lowest))
     is_carried = len(lowest) >= 3 or (bool(scene.body.semi_axes.any()) and _lies(scene))
     return is_carried and bool(under_centre) and _turns_about_the_vertical(scene)
+
+
+def _surrounds_the_centre(base: Array) -> bool:
+    """Whether the centre of mass is above the inside of the base: seen from it, no gap between neighbouring points is half a turn."""
+    angles = np.sort(np.arctan2(base[:, 2], base[:, 0]))
+    return float(np.diff(angles, append=angles[0] + 2.0 * math.pi).max()) < math.pi - SMALL_TURN
 
 
 def _lies(scene: Scenario) -> bool:

@@ -186,3 +186,27 @@ def test_a_box_that_slides_without_friction_is_not_said_to_rest():
     start, floor = {"position": [0.0, 0.1, 0.0], "velocity": [1.0, 0.0, 0.5]}, {"restitution": 0.5, "friction": "none"}
     scene = load({"duration": 1.0, "body": box, "start": start, "gravity": {"acceleration": [0.0, -9.8, 0.0]}, "floor": floor})
     assert truth_for(scene).statement.startswith("the body slides on the floor at a constant velocity")
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.1, 0.25])
+def test_a_box_rests_on_its_face_wherever_its_centre_of_mass_is_above_it(offset):
+    """It lands so that it stays flat only if the mean of its lowest points is under its centre of mass."""
+    box = {"shape": "box", "half_extents": [0.3, 0.1, 0.2], "mass": 1.0, "center_of_mass": [offset, 0.0, 0.0], "inertia": [0.002] * 3}
+    scene = {"duration": 1.0, "body": box, "gravity": {"acceleration": [0.0, -9.8, 0.0]}, "floor": {"restitution": 0.5, "friction": 0.4}}
+    truth = truth_for(load(scene | {"start": {"position": [0.0, 0.1, 0.0]}}))
+    assert truth.name == "bounce-ladder"
+    np.testing.assert_array_equal(truth([0.0, 1.0]).position, [[0.0, 0.1, 0.0]] * 2)
+    falling = truth_for(load(scene | {"start": {"position": [0.0, 0.3, 0.0]}}))
+    assert (falling is None) == (offset > 0.0)
+
+
+@pytest.mark.parametrize(("lean", "rests"), [(0.0, True), (0.15, True), (0.25, False)])
+def test_a_leaning_prism_rests_only_with_its_centre_of_mass_above_its_base(lean, rests):
+    """Its upper face is shifted by twice the lean beside the lower one, which reaches 0.2 m to each side of its middle."""
+    base = np.array([(0.2, -0.1, 0.2), (-0.2, -0.1, 0.2), (-0.2, -0.1, -0.2), (0.2, -0.1, -0.2)]) - [lean, 0.0, 0.0]
+    points = np.vstack([base, base + np.array([2.0 * lean, 0.2, 0.0])]).tolist()
+    body = {"shape": "vertices", "points": points, "mass": 1.0, "inertia": "vertices"}
+    floor, gravity = {"restitution": 0.0, "friction": "infinite"}, {"acceleration": [0.0, -9.8, 0.0]}
+    scene = load({"duration": 1.0, "body": body, "start": {"position": [0.0, 0.1, 0.0]}, "gravity": gravity, "floor": floor})
+    truth = truth_for(scene)
+    assert (truth is not None and truth.name == "bounce-ladder") == rests

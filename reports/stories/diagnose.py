@@ -252,8 +252,8 @@ def differences(bodies: Sequence[BodyDiagnosis]) -> Rows:
 
 
 def summary(diagnosis: Diagnosis) -> str:
-    """The number of findings of each kind, and the number of bodies without a result."""
-    kinds = [_kind(finding) for body in diagnosis.bodies for _, finding in body.findings]
+    """The number of findings of each kind, as many as there are sentences on each body, and the number of bodies without a result."""
+    kinds = [_kind(same[0][1]) for body in diagnosis.bodies for same in grouped(body.findings, _shared).values()]
     text = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
     broken = sum(bool(body.breakdown) for body in diagnosis.bodies)
     without = f"; {counted(broken, 'body', 'bodies')} without a result" if broken else ""

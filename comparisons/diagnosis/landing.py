@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, REBOUND, TIPS, UNTURNED, WATCHED, Answer, Finding, Kind
-from dropspin.comparisons.diagnosis.loose_body import LooseBody
+from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
 from dropspin.comparisons.judging.error_budget import error_budget, is_sufficient
 from dropspin.scenarios.rotations import rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, UP, VELOCITY, Array
@@ -20,6 +20,8 @@ LEAST_NOISE = 1e-6  # of a ratio of speeds
 LONGEST_WATCHED = 3.0  # s, for an impact on a soft surface
 STILL = 0.01
 """Share of the speed of an impact at which a body that has not left the surface rests on it."""
+OF_CONTACT = ("solref", "solimp", "stiffness")
+"""Settings of contacts that a file may have, beside restitution and friction."""
 THROUGH = "none"
 """The rebound of a body that passes through the surface."""
 
@@ -138,8 +140,8 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     is_wrong = depth_error > noteworthy or moving > noteworthy
     finest_depth, finest_speed, _ = _at_rest(body, dts[-1]) if is_wrong else (depth, speed, tips)
     floats = facts.margin > 0.0 and -depth > noteworthy
-    of_depth = (Finding("setting", ("margin",)),) * floats + _of_error(depth_error, abs(finest_depth - facts.rest_depth), noteworthy)
-    of_speed = _of_error(moving, finest_speed, noteworthy)
+    of_depth = (Finding("setting", ("margin",)),) * floats + _of_error(facts, depth_error, abs(finest_depth - facts.rest_depth), noteworthy)
+    of_speed = _of_error(facts, moving, finest_speed, noteworthy)
     return [
         *support,
         Answer("rest", "penetration", "m", measured=depth, in_force=facts.rest_depth, physical=0.0, findings=of_depth),
@@ -147,9 +149,17 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     ]
 
 
-def _of_error(error: float, finest: float, noteworthy: float) -> tuple[Finding, ...]:
-    """The finding of an error that exceeds a limit, by what the error is at the finest time step; none if the error is not known."""
-    return (Finding("time step" if finest < 0.6 * error else "model", ("timestep",)),) * (error > noteworthy)
+def _of_error(facts: Facts, error: float, finest: float, noteworthy: float) -> tuple[Finding, ...]:
+    """The finding of an error that exceeds a limit, by what the error is at the finest time step; none if the error is not known.
+
+    An error that the time step does not reduce is due to the contact, whose settings may be those of the file.
+    """
+    if not error > noteworthy:
+        return ()
+    if finest < 0.6 * error:
+        return (Finding("time step", ("timestep",)),)
+    written = tuple(name for name in OF_CONTACT if name in facts.settings and facts.settings[name].file)
+    return (Finding("setting", written) if written else Finding("model", ("timestep",)),)
 
 
 def _at_rest(body: LooseBody, dt: float) -> tuple[float, float, bool]:

@@ -292,3 +292,11 @@ def test_settings_of_a_slide_are_all_that_the_remedy_changes(tmp_path):
     [found] = [found for answer, found in findings_of(body, slide) if answer.direction == "45°"]
     assert found.settings == ("cone", "impratio", "timestep")
     assert 'timestep="0.0013" cone="elliptic" impratio="10"' in found.remedies[0].text
+
+
+def test_a_body_that_trembles_on_an_undamped_contact_of_the_file_is_due_to_this_contact(tmp_path):
+    undamped = '<geom type="sphere" size=".1" density="200" solref="-1000 0"/>'
+    [(answer, found)] = findings_of(body_of(tmp_path, FREE.format(undamped), 'timestep="0.0002"'), rest)
+    assert (answer.quantity, found.kind, found.settings) == ("drift speed", "setting", ("solref",))
+    damped = undamped.replace("-1000 0", "-1000 -30")
+    assert findings_of(body_of(tmp_path, FREE.format(damped), 'timestep="0.0002"'), rest) == []

@@ -24,7 +24,7 @@ from dropspin.comparisons.running.parallel import results_in_parallel, started_c
 from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
-from dropspin.scenarios.bodies.mesh import is_closed
+from dropspin.scenarios.bodies.mesh import openness
 from dropspin.scenarios.bodies.mesh_files import read_mesh
 
 if TYPE_CHECKING:  # each engine is imported in its own process alone
@@ -147,10 +147,8 @@ def diagnose(
     with tempfile.TemporaryDirectory() as folder:
         if ending in (".obj", ".stl"):
             points, faces = read_mesh(path, given)
-            if not is_closed(points, faces):
-                raise DropspinError(
-                    f"{given}: the mesh is not closed, so that it has no volume; close it, or give the body in an MJCF file."
-                )
+            if why := openness(points, faces):
+                raise DropspinError(f"{given}: the mesh {why}, so that it has no volume; mend it, or give the body in an MJCF file.")
             is_inside_out = np.linalg.det(points[faces]).sum() < 0.0  # of which MuJoCo refuses the exact volume
             inertia_of = "legacy" if is_inside_out else "exact"
             text = MESH.format(path=path.resolve(), inertia=inertia_of, name=path.stem, density=density)

@@ -18,11 +18,19 @@ MOST_DRAWN = 2000  # faces; the hull of a finer mesh is drawn
 
 
 def is_closed(points: Array, faces: Faces) -> bool:
-    """Whether each edge has two triangles, which pass it in opposite directions; vertices at one position count as one."""
+    """Whether each edge has two triangles, which pass it in opposite directions."""
+    return not openness(points, faces)
+
+
+def openness(points: Array, faces: Faces) -> str:
+    """Why triangles have no inside; empty if they have one. Vertices at one position count as one."""
     _, merged = np.unique(points, axis=0, return_inverse=True)
     first, second = merged.reshape(-1)[faces][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).T
-    here, there = np.sort(first * len(points) + second), np.sort(second * len(points) + first)
-    return bool(np.array_equal(here, there))
+    here, there = first * len(points) + second, second * len(points) + first
+    if np.array_equal(np.sort(here), np.sort(there)):
+        return ""
+    are_pairs = np.unique(np.minimum(here, there), return_counts=True)[1] % 2 == 0
+    return "has triangles that are inside out beside others" if are_pairs.all() else "is not closed"
 
 
 class Mesh(Shape):
@@ -42,9 +50,10 @@ class Mesh(Shape):
     def _has_mass(self) -> Self:
         if self.faces.min() < 0 or self.faces.max() >= len(self.points):
             raise ValueError(f"faces has an index outside of the {len(self.points)} points")
-        if self._distribution == "solid" and self.center_of_mass is None and not is_closed(self.points, self.faces):
+        needs_inside = self._distribution == "solid" and self.center_of_mass is None
+        if needs_inside and (why := openness(self.points, self.faces)):
             raise ValueError(
-                "the mesh is not closed, so that nothing is inside; give inertia = 'surface' or 'vertices', or inertia as numbers with "
+                f"the mesh {why}, so that nothing is inside; give inertia = 'surface' or 'vertices', or inertia as numbers with "
                 "center_of_mass"
             )
         moments = np.linalg.eigvalsh(self.inertia_tensor)

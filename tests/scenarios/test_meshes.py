@@ -180,7 +180,10 @@ def test_a_large_file_is_refused_by_its_size(tmp_path, monkeypatch):
     ("keys", "message"),
     [
         ({"faces": OUTWARD[:3]}, "the mesh is not closed, so that nothing is inside; give inertia = 'surface'"),
-        ({"faces": [*OUTWARD[:3], OUTWARD[3][::-1]]}, "the mesh is not closed"),
+        (
+            {"faces": [*OUTWARD[:3], OUTWARD[3][::-1]]},
+            "the mesh has triangles that are inside out beside others",
+        ),
         ({"faces": [[0, 1, 9]]}, "an index outside of the 4 points"),
         ({"points": [[0.0, 0.0]]}, "rows of three numbers of up to 1e\\+50"),
         ({"points": [[0.0, 0.0, float("inf")]]}, "rows of three numbers of up to 1e\\+50"),

@@ -53,12 +53,13 @@ def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         lively = body.tried(("restitution",))
         answers += [rebound(lively, dts, speed, f"{REBOUND} on a surface with restitution 1") for speed in IMPACTS]
     found = _impacts(body, 1.0, dts[0], PHASES)
-    blank = Answer("impact", "", "1", speed=1.0, detail=found.failure)
+    failure = "passes through" if found.failure == THROUGH else found.failure
+    blank = Answer("impact", "", "1", speed=1.0, detail=failure)
     of_upward = replace(blank, quantity="largest upward / impact speed", measured=float(np.mean(found.upward)))
     answers.append(replace(of_upward, least=float(min(found.upward)), most=float(max(found.upward))))
     answers.append(replace(blank, quantity="penetration", unit="m", measured=float(np.max(found.depths))))
     longest = float(np.max(found.times))
-    detail = found.failure or (f"> {WATCHED:g} s" if math.isinf(longest) else "")
+    detail = failure or (f"> {WATCHED:g} s" if math.isinf(longest) else "")
     answers.append(replace(blank, quantity="contact", unit="s", measured=longest, detail=detail))
     return answers
 

@@ -22,8 +22,6 @@ STILL = 0.01
 """Share of the speed of an impact at which a body that has not left the surface rests on it."""
 OF_CONTACT = ("solref", "solimp", "stiffness")
 """Settings of contacts that a file may have, beside restitution and friction."""
-THROUGH = "none"
-"""The rebound of a body that passes through the surface."""
 
 
 class Impacts(NamedTuple):
@@ -34,7 +32,8 @@ class Impacts(NamedTuple):
         upward: Largest upward speed of the centre of mass over impact speed.
         depths: Largest depth [m].
         times: Time in contact [s]; infinite if the body does not leave the surface.
-        failure: Why values are NaN; empty if they are not.
+        failure: Why values are NaN, for a table; empty if they are not.
+        passes_through: Whether it is that the body passes through the surface.
     """
 
     ratios: Array
@@ -42,6 +41,7 @@ class Impacts(NamedTuple):
     depths: Array
     times: Array
     failure: str = ""
+    passes_through: bool = False
 
 
 def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
@@ -53,13 +53,12 @@ def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         lively = body.tried(("restitution",))
         answers += [rebound(lively, dts, speed, f"{REBOUND} on a surface with restitution 1") for speed in IMPACTS]
     found = _impacts(body, 1.0, dts[0], PHASES)
-    failure = "passes through" if found.failure == THROUGH else found.failure
-    blank = Answer("impact", "", "1", speed=1.0, detail=failure)
+    blank = Answer("impact", "", "1", speed=1.0, detail=found.failure)
     of_upward = replace(blank, quantity="largest upward / impact speed", measured=float(np.mean(found.upward)))
     answers.append(replace(of_upward, least=float(min(found.upward)), most=float(max(found.upward))))
     answers.append(replace(blank, quantity="penetration", unit="m", measured=float(np.max(found.depths))))
     longest = float(np.max(found.times))
-    detail = failure or (f"> {WATCHED:g} s" if math.isinf(longest) else "")
+    detail = found.failure or (f"> {WATCHED:g} s" if math.isinf(longest) else "")
     answers.append(replace(blank, quantity="contact", unit="s", measured=longest, detail=detail))
     return answers
 
@@ -70,14 +69,17 @@ def rebound(body: LooseBody, dts: Sequence[float], speed: float, quantity: str) 
     exact = math.nan if body.facts.restitution is None else body.facts.restitution
     answer = Answer("impact", quantity, "1", speed=speed, in_force=exact, detail=found[0].failure)
     kind: Kind
-    if found[0].failure:
-        kind = "setting" if found[-1].failure == THROUGH else "time step"
+    if found[0].passes_through:
+        kind = "setting" if found[-1].passes_through else "time step"
         why = "because the body passes through the surface, which harder contacts or smaller time steps prevent"
-        return replace(answer, findings=(Finding(kind, ("timestep",), detail=why),) * (found[0].failure == THROUGH))
+        return replace(answer, detail="none", findings=(Finding(kind, ("timestep",), detail=why),))
+    if found[0].failure:
+        return answer
+    dts = [dt for dt, impacts in zip(dts, found, strict=True) if not impacts.failure]
     ratios = [impacts.ratios for impacts in found if not impacts.failure]
     means = [float(np.mean(ratio)) for ratio in ratios]
     limit = 0.0 if max(means) == 0.0 else math.nan
-    if is_sufficient(dts[: len(means)]) and max(means) > 0.0:
+    if is_sufficient(dts) and max(means) > 0.0:
         noise = [max(float(np.ptp(ratio)) / math.sqrt(12.0) / len(ratio), LEAST_NOISE) for ratio in ratios]
         budget = error_budget(dts, means, resolution=noise, signed=False, negligible=0.1 * NOTEWORTHY)
         limit = math.nan if budget.cause == "unresolved" else budget.asymptotic_error
@@ -86,7 +88,7 @@ def rebound(body: LooseBody, dts: Sequence[float], speed: float, quantity: str) 
     if max(change, float(np.ptp(ratios[0]))) > NOTEWORTHY:
         stays = not math.isnan(exact) and abs(means[-1] - exact) >= 0.6 * change
         kind = "model" if stays else "time step"
-        finest = "" if math.isfinite(limit) or len(means) < 2 else f"but {means[-1]:.3g} at {1e3 * dts[len(means) - 1]:.3g} ms"
+        finest = "" if math.isfinite(limit) or len(dts) < 2 else f"but {means[-1]:.3g} at {1e3 * dts[-1]:.3g} ms"
         findings = (Finding(kind, (*body.causes.get("impact", ()), "timestep"), detail=finest),)
     return replace(answer, measured=means[0], limit=limit, findings=findings, least=float(min(ratios[0])), most=float(max(ratios[0])))
 
@@ -109,7 +111,8 @@ def _impacts(body: LooseBody, speed: float, dt: float, phases: int) -> Impacts:
             return Impacts(*found.T)
     is_through = any(of_states[-1] < -2.0 * size for of_states in heights)
     unknown = np.full(phases, math.nan)
-    return Impacts(unknown, unknown, unknown, unknown, THROUGH if is_through else f"contact > {LONGEST_WATCHED:g} s")
+    failure = "passes through" if is_through else f"contact > {LONGEST_WATCHED:g} s"
+    return Impacts(unknown, unknown, unknown, unknown, failure, is_through)
 
 
 def _impact(states: Array, heights: Array, gap: float, dt: float, speed: float, g: float) -> tuple[float, float, float, float]:

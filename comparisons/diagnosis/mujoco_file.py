@@ -58,8 +58,7 @@ class MuJoCoFile:
                 self.model = self._compiled(path)
         except (ValueError, mujoco.FatalError) as error:
             raise DropspinError(f"{given}: MuJoCo does not compile it: {one_line(error)}.") from None
-        self.data = mujoco.MjData(self.model)
-        mujoco.mj_kinematics(self.model, self.data)
+        _, self.data = placed(self.model)
         flags, bit = self.model.opt.disableflags, mujoco.mjtDisableBit
         self.gravity = np.zeros(3) if flags & bit.mjDSBL_GRAVITY else np.array(self.model.opt.gravity)
         self.has_contacts = not flags & (bit.mjDSBL_CONTACT | bit.mjDSBL_CONSTRAINT)
@@ -90,10 +89,7 @@ class MuJoCoFile:
         spec.compiler.boundmass, spec.compiler.boundinertia, spec.compiler.settotalmass = LEAST, LEAST, -1.0
         spec.compiler.balanceinertia, spec.compiler.inertiafromgeom = True, mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
         with quiet():
-            model = spec.compile()
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        return model, data
+            return placed(spec.compile())
 
     @cached_property
     def exact(self) -> tuple[Any, Any] | None:
@@ -107,14 +103,9 @@ class MuJoCoFile:
             mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT
         try:
             with quiet():
-                model = spec.compile() if counted else None
+                return placed(spec.compile()) if counted else None
         except ValueError:
-            model = None
-        if model is None:
             return None
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        return model, data
 
     @cached_property
     def heads(self) -> dict[str, int]:
@@ -263,6 +254,13 @@ class MuJoCoFile:
     def _settings_of(self, geom: int) -> GeomSettings:
         model, names = self.model, ("solref", "solimp", "friction", "condim", "margin", "priority", "solmix")
         return GeomSettings(**{name: plain(getattr(model, f"geom_{name}")[geom]) for name in names})
+
+
+def placed(model: Any) -> tuple[Any, Any]:
+    """A compiled model, and its data with the bodies where the file has them."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return model, data
 
 
 def plain(value: Any) -> Any:

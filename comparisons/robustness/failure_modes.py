@@ -132,7 +132,7 @@ def _errors(motion: ExtendedMotion, case: Comparison, within: float) -> Iterator
         if metric.name not in known:
             continue
         try:
-            size = abs(metric.average([case]).value)
+            size = abs(metric.value([case]))
         except Unresolved:
             continue
         if metric.name == "restitution_error" and math.isnan(size):

@@ -144,7 +144,7 @@ def _errors(entry: EngineEntry, scene: Scenario, dt: float, division: int, metri
     with suppress(Diverged, Unresolved):
         motions = ((phase, record(entry.adapter, phase.scene, dt, every).motion) for phase in phases)
         cases = [Comparison.with_truth(phase.scene, motion, phase.truth) for phase, motion in motions]
-        errors = [abs(METRICS[metric].average(cases).value) for metric in metrics]
+        errors = [abs(METRICS[metric].value(cases)) for metric in metrics]
     return errors if np.isfinite(errors).all() else [math.nan] * len(metrics), processor_time() - start
 
 

@@ -204,33 +204,38 @@ class ContactSearch:
         largest_spin = self.flight.rotor.largest_spin
         integrates = bool(self._starts_on_floor.any()) and now * largest_spin <= 2.0 * FIRST_ANGLE
         times = np.append(0.5 * now * (1.0 + NODES), now) if integrates else np.array([now])
-        heights, speeds = self._corners(times)
+        motion = self._vertical_motion(times)
+        heights, speeds = self._corners_in(motion)
         rounding = np.full(len(self.points), self._tolerance(np.array([now]))[0])
         if integrates:
-            risen, error = (0.5 * now * (WEIGHTS @ speeds[:-1]), 0.0) if self._is_ball else self._risen(times)
+            risen, error = (0.5 * now * (WEIGHTS @ speeds[:-1]), 0.0) if self._is_ball else self._risen(now, motion)
             fastest = abs(self.flight.start[VELOCITY][1]) + now * abs(self._gravity) + self._reach * largest_spin
             heights[-1] = np.where(self._starts_on_floor, risen, heights[-1])
             rounding = np.where(self._starts_on_floor, SPEED_ROUNDING * fastest * now + error, rounding)
         return heights[-1], speeds[-1], rounding
 
-    def _risen(self, times: Array) -> tuple[Array, float]:
-        """How far points about the corners have risen since the start [m], shape (n,), at the last time, and the error of the depth [m].
+    def _risen(self, now: float, motion: tuple[Array, Array, Array, Array]) -> tuple[Array, float]:
+        """How far points about the corners have risen since the start [m], shape (n,), and the error of the depth [m].
 
-        The other times are the nodes of the quadrature.
+        `motion` is the vertical motion at the nodes of the quadrature and, last, now.
         """
-        _, speed, vertical, turning = self._vertical_motion(times)
-        first, last, turned = unrotate(self.flight.start[ORIENTATION], UP), vertical[-1], 0.5 * times[-1] * (WEIGHTS @ turning[:-1])
+        _, speed, vertical, turning = motion
+        first, last, turned = unrotate(self.flight.start[ORIENTATION], UP), vertical[-1], 0.5 * now * (WEIGHTS @ turning[:-1])
         lengths = float(np.linalg.norm(self.semi_axes * first) + np.linalg.norm(self.semi_axes * last))
         moved = self.semi_axes * turned
         deeper = float(moved @ (self.semi_axes * (first + last))) / lengths
         error = ATTITUDE_ROUNDING * float(np.linalg.norm(moved)) * self._reach / lengths
-        return 0.5 * times[-1] * float(WEIGHTS @ speed[:-1]) + self.points @ turned - deeper, error
+        return 0.5 * now * float(WEIGHTS @ speed[:-1]) + self.points @ turned - deeper, error
 
     def _corners(self, times: Array) -> tuple[Array, Array]:
         """Heights above the floor [m] and upward velocities [m/s] of the corners, shapes (m, n), at times [s], shape (m,)."""
-        height, speed, vertical, turning = self._vertical_motion(times)
+        return self._corners_in(self._vertical_motion(times))
+
+    def _corners_in(self, motion: tuple[Array, Array, Array, Array]) -> tuple[Array, Array]:
+        """The same from the vertical motion at these times."""
+        height, speed, vertical, turning = motion
         depth = self._depth(vertical)
-        rolled = np.zeros(len(times)) if self._is_ball else -dot(self.semi_axes**2 * vertical, turning) / depth
+        rolled = np.zeros(len(height)) if self._is_ball else -dot(self.semi_axes**2 * vertical, turning) / depth
         heights = height[:, None] + vertical @ self.points.T - depth[:, None]
         return heights, speed[:, None] + turning @ self.points.T + rolled[:, None]
 

@@ -21,6 +21,8 @@ from dropspin.scenarios.state import Array
 
 EXPLAINED = 0.4
 """Share of the difference from the rotation of a free body that another reading of the orientations leaves at most."""
+LEAST_LEFT = 0.5
+"""Share of the white noise of the orientations that every reading leaves."""
 MOST_ROTORS = 8
 """Flights whose rotation is tried in other readings."""
 RESTS_NEAR = 0.04
@@ -48,7 +50,8 @@ def of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
     is_ball = bool(np.allclose(inertia, inertia[0, 0] * np.eye(3)))  # a spin is constant then, in every reading
     turns = _restlessness([rotor.samples.values for rotor in flights.rotations])
     tried = flights.found[:MOST_ROTORS] if not is_ball else []
-    orders = list(orders_of_axes(log.header.body)) if tried else []
+    can_be_explained = bool(tried) and EXPLAINED * turns > LEAST_LEFT * flights.turning.noise.white
+    orders = list(orders_of_axes(log.header.body)) if can_be_explained else []
     lefts = [_restlessness([rotation(flight, exchanged).samples.values for flight in tried]) for exchanged, _ in orders]
     left = min(lefts, default=math.inf)
     order, direction = {"quaternion": other}, {"rotation": inverse}

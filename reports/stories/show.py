@@ -120,8 +120,8 @@ def _built(entry: "EngineEntry", scene: Scenario, dt: float) -> Rows:
 
 def _setting_rows(engine: "Engine", settings: Mapping[str, Any], calibrated: Mapping[str, Any]) -> Rows:
     """The settings in force, each with its source, and with its calibrated value if it differs."""
-    acting = {name: setting for name, setting in engine.settings.items() if not setting.is_computed and engine.unmet_need(name) is None}
-    defaults = {name: setting.default for name, setting in acting.items()}
+    at_default = {name: one for name, one in engine.settings.items() if not (one.is_computed and engine.is_calibrated)}
+    defaults = {name: setting.default for name, setting in at_default.items() if engine.unmet_need(name) is None}
     reasons = engine.reasons if engine.is_calibrated else {}
 
     def text(name: str, value: Any) -> str:

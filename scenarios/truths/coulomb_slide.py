@@ -1,15 +1,15 @@
-"""A body lies or slides flat on a rough floor, level or sloped: friction acts against its velocity until it stops.
+"""A body lies or slides flat on a floor, level or sloped: friction acts against its velocity until it stops.
 
     dv/dt = g_t - f g_n v/|v|        g_t, g_n: gravity along the floor and into it
 
 If |g_t| <= f g_n, it stays where it stops, and a body that starts at rest does not move. On a level floor it stops at t = |v₀|/(f g), after
-|v₀|²/(2 f g). The body stays flat if the normal force can act ahead of the centre of mass by f times its height; at rest, down the slope by
-|g_t|/g_n times its height. These points must lie within the base.
+|v₀|²/(2 f g). On a frictionless slope it slides with the acceleration g_t. The body stays flat if the normal force can act ahead of the
+centre of mass by f times its height; at rest, down the slope by |g_t|/g_n times its height. These points must lie within the base.
 
 Source: C. A. de Coulomb, Théorie des machines simples (1785); `dry_friction` for the motion on a slope.
 Valid for: a box or other body on at least three vertices, lying on the floor at the start, without spin, at rest or moving along the floor;
-a Coulomb coefficient above 0, or infinite friction at rest; gravity into the floor, which may be sloped, no damping. Restitution has no
-effect, because no contact separates.
+a Coulomb coefficient, infinite friction at rest, or a slope without friction; gravity into the floor, which may be sloped, no damping.
+Restitution has no effect, because no contact separates.
 """
 
 import math
@@ -29,12 +29,13 @@ LEVEL = np.array([1.0, 0.0, 1.0])
 def coulomb_slide(scene: Scenario, floor: Floor) -> Truth | None:
     """The exact solution of a flat slide, or of rest on a slope."""
     start, g = scene.initial_state, scene.acceleration
-    if floor.friction == "none" or g[1] >= 0.0 or start[8] != 0.0 or start[SPIN].any():
+    if g[1] >= 0.0 or start[8] != 0.0 or start[SPIN].any():
         return None
     pull, into = g * LEVEL, -float(g[1])
     velocity = start[VELOCITY]
-    moves = velocity.any()
-    if math.isinf(floor.coefficient) if moves else not pull.any():
+    if not pull.any() and (floor.friction == "none" or not velocity.any()):
+        return None  # `bounce_ladder` has it
+    if math.isinf(floor.coefficient) and velocity.any():
         return None
     motion, _ = dry_friction(velocity, pull, floor.coefficient * into)
     if not _stays_flat(scene, velocity, pull / into, floor.coefficient):
@@ -54,7 +55,7 @@ def _stays_flat(scene: Scenario, velocity: Array, slope: Array, friction: float)
     """Whether the point at which the normal force must act is within the base.
 
     The distance of this point from the centre of mass is height times friction coefficient, in the direction of the velocity, which turns
-    from its initial direction towards the slope. If the body is at rest, the distance is height times slope.
+    from its initial direction towards the slope. Where the body rests, the distance is height times slope.
     """
     base = scene.body.lowest(np.array(scene.start.orientation), TOUCHING)
     hull = convex_hull(base[:, [0, 2]]) if scene.starts_on_floor and len(base) >= 3 else None
@@ -62,7 +63,7 @@ def _stays_flat(scene: Scenario, velocity: Array, slope: Array, friction: float)
         return False
     height, steepness = -float(base[:, 1].min()), float(np.linalg.norm(slope))
     outward, reach = hull.equations[:, :2], -hull.equations[:, 2]
-    needed = outward @ slope[[0, 2]]
+    needed = outward @ slope[[0, 2]] if friction >= steepness else np.zeros(len(reach))  # else it never rests
     if velocity.any() or friction < steepness:
         first = (velocity if velocity.any() else slope)[[0, 2]]
         last = slope[[0, 2]] if steepness else first

@@ -86,6 +86,21 @@ def test_box_slides_down_a_steeper_slope():
     np.testing.assert_allclose(motion.velocity[0], [0.6, 0.0, -0.8], rtol=1e-15)
 
 
+def test_box_slides_down_a_slope_without_friction_even_one_on_which_it_could_not_rest():
+    """By x = v₀ t + a t²/2; its centre of mass is 1 m high, so that more friction tips it over."""
+    given = {"half": (0.2, 1.0, 0.2), "height": 1.0, "gravity": {"acceleration": [3.0, -10.0, -4.0]}}
+    for friction, acceleration in (("none", 5.0), (0.1, 4.0), (0.24, 2.6)):
+        truth = truth_for(sliding(velocity=(0.0, 0.0, 0.0), friction=friction, **given))
+        assert truth.name == "coulomb-slide"
+        end = truth([2.0])
+        np.testing.assert_allclose(end.velocity[0], 2.0 * acceleration * np.array([0.6, 0.0, -0.8]), rtol=1e-15)
+        np.testing.assert_allclose(end.position[0], [1.0, 1.0, 2.0] + 2.0 * acceleration * np.array([0.6, 0.0, -0.8]), rtol=1e-15)
+    launched = truth_for(sliding(velocity=(1.0, 0.0, 2.0), friction="none", **given))([2.0])
+    np.testing.assert_allclose(launched.position[0], [1.0 + 2.0 + 6.0, 1.0, 2.0 + 4.0 - 8.0], rtol=1e-15)
+    for friction in (0.26, 0.6):  # its reach is 0.25 m down this slope, and it would stay from 0.5 on
+        assert truth_for(sliding(velocity=(0.0, 0.0, 0.0), friction=friction, **given)) is None
+
+
 def test_box_pushed_across_a_slope_stops_or_turns_down():
     """It stops after |v₀| (f g_n + g_t cos ψ₀)/((f g_n)² - g_t²); on a steeper slope its velocity turns towards the slope."""
     across = sliding(velocity=(4.0, 0.0, -3.0), gravity={"acceleration": [1.5, -10.0, 2.0]}, friction=0.3)

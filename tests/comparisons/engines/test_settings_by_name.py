@@ -164,6 +164,9 @@ def test_show_lists_settings_with_sources_and_marks():
     assert [rows[name]["source"] for name in ("contactERP", "restitution", "globalCFM")] == ["calibrated", "computed", "engine's default"]
     rows = {row["what"]: row for row in built_rows(falling(), "mujoco[profile=default]", 1e-3)}
     assert (rows["solref"]["is"], rows["solref"]["source"], rows["solref"]["calibrated"]) == ("0.02 1", "engine's default", "0 -1600")
+    rows = {row["what"]: row for row in built_rows(falling(), "pybullet[profile=default]", 1e-3)}
+    damping = rows["linearDamping"]  # of a multibody, in force without being given
+    assert (damping["is"], damping["source"], damping["calibrated"]) == ("0.04", "engine's default", "0")
     assert "o_solref" not in rows  # without override it has no effect
 
 

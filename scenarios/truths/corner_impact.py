@@ -9,9 +9,9 @@ Source: E. T. Whittaker, Analytical Dynamics, section 95 (impact of smooth and o
 Valid for: impacts of one corner, or of the two corners of an edge that strike the floor at once and have equal velocities before and after;
 a ball with any spin; no damping. The solution ends, and gives the reason, at the first of these events: the hundredth impact; an impact
 that is not of this kind, or for which the law has no solution or several, or in which the floor would have to pull (as eq 17 may demand of
-a corner that slides fast), or after which the body stays on the floor; a flight that is short relative to the longest, as before impacts
-accumulate or where two planes are struck at once; a time at which rounding determines whether the body touches a plane or when it turns
-over; growth of an initial disturbance of 1e-10 rad/s to 1e-6.
+a corner that slides fast), or after which the body stays on the floor, unless it is a ball without walls, which slides and rolls on; a
+flight that is short relative to the longest, as before impacts accumulate or where two planes are struck at once; a time at which rounding
+determines whether the body touches a plane or when it turns over; growth of an initial disturbance of 1e-10 rad/s to 1e-6.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,7 +27,8 @@ from dropspin.scenarios.surfaces import Floor, Surface, Wall
 from dropspin.scenarios.truths.contact_search import Contact, ContactSearch
 from dropspin.scenarios.truths.flight import TURNS_OVER, Flight, flight_states
 from dropspin.scenarios.truths.impact_laws import Law, law_of, velocities_after
-from dropspin.scenarios.truths.truth import Impact, Truth, piece
+from dropspin.scenarios.truths.rolling import rolling
+from dropspin.scenarios.truths.truth import Impact, States, Truth, piece
 
 CORNER_TOLERANCE = 1e-9  # of the body's size; corners at most this much higher than the lowest touch too
 MAX_IMPACTS = 100
@@ -82,7 +83,8 @@ def corner_impact(scene: Scenario, floor: Floor, law: Law | None = None) -> Trut
         where = "ball" if scene.body.is_ball else "point"
     count = "one" if len(events) == 1 else str(len(events))
     impacts = f"{count} {where} impact{'s' if len(events) > 1 else ''}"
-    statement = f"flights on a parabola, with the rotation of a body without torque, and {impacts} ({impulse})"
+    then = "; then sliding and rolling (Coriolis 1835)" if last.is_rolling else ""
+    statement = f"flights on a parabola, with the rotation of a body without torque, and {impacts} ({impulse}){then}"
     return Truth(f"{where}-impact", statement, states, events, last.end, last.reason)
 
 
@@ -123,11 +125,12 @@ class _Plane:
 class _Flight:
     """One flight. At the time `end` [s] there is an impact, or the scene ends, or the solution ends for the `reason`."""
 
-    motion: Flight
+    motion: States
     end: float
     impact: Impact | None = None
     reason: str = ""
     is_other_impact: bool = False  # one that the formula does not cover
+    is_rolling: bool = False  # a ball on the floor, after its last flight
 
 
 def _flights(scene: Scenario, planes: Sequence[_Plane], start: Array) -> Iterator[_Flight]:
@@ -164,8 +167,20 @@ def _flights(scene: Scenario, planes: Sequence[_Plane], start: Array) -> Iterato
         yield _Flight(motion, now, impact)
         motion, left = flight_states(impact.after, inertia, g), plane
         if not _leave(touching, plane.seen(impact.after)):
-            yield _Flight(motion, now, reason=f"the body stays on the {plane.name}")
+            rolls = _rolling_from(scene, plane, impact.after, scene.duration - now)
+            stays = _Flight(motion, now, reason=f"the body stays on the {plane.name}")
+            yield stays if rolls is None else _Flight(rolls, scene.duration, is_rolling=True)
             return
+
+
+def _rolling_from(scene: Scenario, plane: _Plane, after: Array, duration: float) -> States | None:
+    """The motion on an endless floor of a ball that stays on it after an impact; None for other bodies and planes."""
+    if not (scene.body.is_ball and isinstance(plane.surface, Floor) and scene.wall is None):
+        return None
+    on_floor = after.copy()
+    on_floor[8] = 0.0
+    follows = rolling(scene.starting_at(on_floor).model_copy(update={"duration": duration}), plane.surface)
+    return None if follows is None else follows.states
 
 
 def _impact(scene: Scenario, plane: _Plane, touching: Array, time: float, before: Array) -> Impact | str:

@@ -72,3 +72,32 @@ def test_ball_of_unequal_moments_follows_the_cone_law_and_a_ball_of_equal_ones_c
     content = ball_with_spin(0.1, [0.001, 0.004, 0.004]).model_dump(exclude_none=True)
     assert "against the remaining slip" in truth_for(load(content)).statement
     assert truth_for(load(content | {"body": content["body"] | {"inertia": "solid"}})).statement.endswith("(Coulomb friction)")
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.5, "infinite"])
+def test_ball_that_stays_on_the_floor_slides_and_rolls_on(friction):
+    """A solid ball loses min(f u, 2 s/7) of its slip s per 2/7 in the impact and f g in every second after it; it rolls at v - 2 s/7."""
+    scene = load(
+        {
+            "name": "landing",
+            "duration": 3.0,
+            "body": {"shape": "sphere", "radius": 0.1, "mass": 2.0},
+            "start": {"position": [0.0, 0.6, 0.0], "velocity": [3.0, 0.0, 1.0], "angular_velocity": [5.0, 2.0, 7.0]},
+            "gravity": {"acceleration": [0.0, -9.8, 0.0]},
+            "floor": {"restitution": 0.0, "friction": friction},
+        }
+    )
+    truth = truth_for(scene)
+    assert (truth.horizon, len(truth.events)) == (3.0, 1)
+    f, u, lands = np.inf if friction == "infinite" else friction, np.sqrt(2 * 9.8 * 0.5), np.sqrt(2 * 0.5 / 9.8)
+    velocity, slip = np.array([3.0, 0.0, 1.0]), np.array([3.0 + 0.7, 0.0, 1.0 - 0.5])
+    size = np.linalg.norm(slip)
+    lost = min(f * u, 2 / 7 * size)
+    slides = (2 / 7 * size - lost) / (f * 9.8)  # for so long
+    after, rolls = velocity - lost * slip / size, velocity - 2 / 7 * slip
+    np.testing.assert_allclose(truth.events[0].after[VELOCITY], after, rtol=0, atol=1e-14 * 4)
+    end = truth([lands + slides + 1e-9, 3.0])
+    np.testing.assert_allclose(end.velocity, [rolls] * 2, rtol=0, atol=1e-14 * 4)
+    np.testing.assert_allclose(end.angular_velocity, [[rolls[2] / 0.1, 2.0, -rolls[0] / 0.1]] * 2, rtol=0, atol=1e-12)
+    where = [0.0, 0.1, 0.0] + velocity * lands + 0.5 * (after + rolls) * slides + rolls * (3.0 - lands - slides)
+    np.testing.assert_allclose(end.position[1], where, rtol=0, atol=1e-13 * 7)

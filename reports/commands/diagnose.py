@@ -5,19 +5,12 @@ from typing import Any
 
 import click
 
-from dropspin.reports.commands.options import POSITIVE, as_json, jobs_option, output_option, time_limit_option
+from dropspin.reports.commands.options import POSITIVE, as_json, engines_option, jobs_option, output_option, time_limit_option
 
 
 @click.command("diagnose")
 @click.argument("file", metavar="FILE")
-@click.option(
-    "-e",
-    "--engine",
-    "engines",
-    multiple=True,
-    metavar="ENGINE",
-    help="mujoco or pybullet, without options: settings are those of the file. [default: those that can read the file]",
-)
+@engines_option("mujoco or pybullet, without options: settings are those of the file. [default: those that can read the file]")
 @click.option("--body", "bodies", multiple=True, metavar="NAME", help="A body to diagnose; repeat for more. [default: all free bodies]")
 @click.option("--on", metavar="GEOM", help="The plane or box to land on. [default: the first that the body collides with]")
 @click.option("--loose", is_flag=True, help="Also diagnose bodies on joints, each cut loose from its joint.")

@@ -9,7 +9,7 @@ from dropspin.reports.commands.options import POSITIVE, as_json, engines_option,
 
 @click.command("limits")
 @click.argument("scenes", nargs=-1, metavar="[SCENE]...")
-@engines_option
+@engines_option()
 @click.option(
     "--axis",
     "axes",

@@ -9,7 +9,7 @@ from dropspin.reports.commands.options import FIVE_MINUTES, as_json, engines_opt
 
 @click.command("compare")
 @click.argument("recording", metavar="RECORDING")
-@engines_option
+@engines_option()
 @click.option(
     "--fit", "fits", is_flag=True, help="First fit friction and restitution for each engine, to find the part of the error that they cause."
 )

@@ -9,7 +9,7 @@ from dropspin.reports.commands.options import FIVE_MINUTES, as_json, engines_opt
 
 @click.command("fit")
 @click.argument("recording", metavar="RECORDING")
-@engines_option
+@engines_option()
 @click.option(
     "--frames", type=click.IntRange(2, 100), default=8, metavar="N", help="Number of frames of each toss to use after its flight."
 )

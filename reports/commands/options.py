@@ -13,14 +13,6 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-engines_option = click.option(
-    "-e",
-    "--engine",
-    "engines",
-    multiple=True,
-    metavar="ENGINE",
-    help="An engine, with options (dropspin show ENGINE lists them); repeat for more.",
-)
 as_json = click.option("--json", "json_output", is_flag=True, help="Print JSON instead of a table.")
 BASELINE = "dropspin-baseline.toml"
 """The baseline that `accept` writes and `check` reads unless another one is named."""
@@ -107,6 +99,13 @@ def _resources(context: click.Context, parameter: click.Parameter, seconds: floa
     from dropspin.comparisons.running.processes import ResourceLimits
 
     return ResourceLimits(processor_time=seconds)
+
+
+def engines_option(
+    what: str = "An engine, with options (dropspin show ENGINE lists them); repeat for more.", *, required: bool = False
+) -> Callable[[Command], Command]:
+    """The option that names engines."""
+    return click.option("-e", "--engine", "engines", multiple=True, required=required, metavar="ENGINE", help=what)
 
 
 def output_option(default: str, of: str) -> Callable[[Command], Command]:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dropspin.reports.commands.options import jobs_option, output_option, time_limit_option, write_text
+from dropspin.reports.commands.options import engines_option, jobs_option, output_option, time_limit_option, write_text
 from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @click.command("record")
-@click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine of the record; repeat for more.")
+@engines_option("An engine of the record; repeat for more.")
 @click.option("--release", "chosen", multiple=True, metavar="VERSION", help="A release; repeat for more. [default: all on the index]")
 @click.option("--merge", "sent", multiple=True, metavar="PATH", help="Add a record that somebody sent, a folder or a file; run nothing.")
 @click.option("--pre", is_flag=True, help="Measure the newest prerelease and the release before it, and write what changed between them.")

@@ -32,7 +32,7 @@ CORE_ENGINES = ("wang", "mujoco", "pybullet")
 
 @click.command("run")
 @click.argument("scenes", nargs=-1, metavar="[SCENE]...")
-@engines_option
+@engines_option()
 @click.option(
     "--dt", "dts", multiple=True, type=float, metavar="SECONDS", help="A time step; repeat for more. [default: 0.004, 0.002, 0.001]"
 )

@@ -10,7 +10,7 @@ from dropspin.reports.commands.options import as_json, engines_option, jobs_opti
 
 @click.command("symmetries")
 @click.argument("scenes", nargs=-1, metavar="[SCENE]...")
-@engines_option
+@engines_option()
 @step_option("")
 @time_limit_option("an engine may use for one scene")
 @jobs_option("pairs of a scene and an engine to run")

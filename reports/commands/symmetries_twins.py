@@ -4,12 +4,12 @@ from typing import Any
 
 import click
 
-from dropspin.reports.commands.options import as_json, jobs_option, step_option, time_limit_option
+from dropspin.reports.commands.options import as_json, engines_option, jobs_option, step_option, time_limit_option
 
 
 @click.command("twins")
 @click.argument("scenes", nargs=-1, required=True, metavar="SCENE...")
-@click.option("-e", "--engine", "engines", multiple=True, required=True, metavar="ENGINE", help="An engine, with options; two or more.")
+@engines_option("An engine, with options; two or more.", required=True)
 @step_option("")
 @time_limit_option("an engine may use for one scene")
 @jobs_option("scenes to run")

@@ -9,7 +9,7 @@ from dropspin.reports.commands.options import POSITIVE, WholeNumbers, as_json, e
 
 @click.command("tradeoff")
 @click.argument("scenes", nargs=-1, metavar="[SCENE]...")
-@engines_option
+@engines_option()
 @click.option("--metric", metavar="METRIC", help="The metric of the error. [default: the scene's leading metric]")
 @click.option(
     "--within",

@@ -9,7 +9,7 @@ from dropspin.comparisons.running.verification import BuildMismatch, verified_ba
 from dropspin.scenarios import load
 from dropspin.scenarios.model import initial_states
 from dropspin.scenarios.rotations import rotate, unrotate
-from dropspin.scenarios.state import ORIENTATION, SPIN
+from dropspin.scenarios.state import ORIENTATION, SPIN, VELOCITY
 
 
 def test_a_spin_may_be_rotated_to_the_body_s_axes_and_back():
@@ -31,6 +31,20 @@ def test_a_spin_may_be_rotated_to_the_body_s_axes_and_back():
         with pytest.raises(BuildMismatch, match="angular velocity at the start"):
             verify_start(made.Exact(), scene, state)
     assert largest > 2e-15  # 9 eps and more do occur
+
+
+def test_a_velocity_that_is_what_rounding_leaves_may_be_rounded_again():
+    """At 120 rad/s the points of the ball move at 12 m/s, of which 2e-15 m/s is an eps; a difference of 1e-12 m/s is none."""
+    ball = load({"duration": 1.0, "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0}})
+    start = ball.initial_state
+    start[SPIN], start[VELOCITY] = [0.0, 120.0, 0.0], [1.758e-15, 0.0, 0.0]
+    scene = ball.starting_at(start)
+    state = scene.initial_state
+    state[VELOCITY] = [1.776e-15, 0.0, 0.0]
+    verify_start(made.Exact(), scene, state)
+    state[VELOCITY] = [1e-12, 0.0, 0.0]
+    with pytest.raises(BuildMismatch, match="velocity at the start"):
+        verify_start(made.Exact(), scene, state)
 
 
 def motions_of_a_batch():

@@ -120,7 +120,7 @@ def _consistent_with(results: Results, engine: str) -> list[str]:
     parameters, faults = causes(results, engine)
     wrong = " or ".join(dict.fromkeys(map(_described, parameters)))
     listed = "; or ".join(filter(None, [wrong, *(fault.message for fault in faults)]))
-    return [f"Possible cause of the asymptotic errors: {listed}."] if listed else []
+    return [f"Possible cause of the asymptotic errors of {engine}: {listed}."] if listed else []
 
 
 def settings_that_explain(results: Results, engine: str) -> list[str]:

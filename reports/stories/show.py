@@ -40,8 +40,9 @@ def scene_rows(scene: Scenario) -> Rows:
         "start rates": f"v = {list(start.velocity)} m/s, ω = {list(start.angular_velocity)} rad/s",
         "truth": truth.statement if truth else "none known",
     }
-    if truth and truth.events:
-        facts["impacts"] = f"{len(truth.events)}, the first at {truth.events[0].time:.6f} s"
+    impacts = [event for event in truth.events if (event.before != event.after).any()] if truth else []  # none of a body at rest
+    if impacts:
+        facts["impacts"] = f"{len(impacts)}, the first at {impacts[0].time:.6f} s"
     if truth and truth.is_exact and not truth.covers_all(scene.duration):
         facts["valid until"] = f"{truth.horizon:.6f} s: {truth.ends}"
     if truth and truth.is_exact and (others := other_laws(scene)):

@@ -1,6 +1,7 @@
 """Convergence over several time steps: the error budget of a metric, corrected by that of its components.
 
-The error at each step is the average over start phases that is largest at the finest step.
+The error at each step is the average over start phases of the flight in which it is largest at the finest step; steps that do not resolve
+this flight have none. Of a metric with two signs, both are judged: one may vanish where the other remains.
 """
 
 import math
@@ -34,6 +35,10 @@ STANDARD_DEVIATIONS = 0.5
 """Factor on a resolution: half of the range of four means over quarters of the phases is twice the standard deviation of their mean."""
 SATURATION = 0.9 * math.pi
 """An angle this near to π saturates, so that it does not measure the error of the orientation."""
+WORSE = {"unresolved": 1, "model": 2}
+"""Causes that are worse than those of an error that vanishes."""
+LARGE_SHARE = 0.5
+"""Share of the largest error of all flights above which that of the flights that enough time steps resolve stands for all."""
 DESYNCHRONISED = 0.5
 """Position error, relative to the drop height, at which a bouncing body is in another flight, so that its position error has no meaning."""
 
@@ -100,11 +105,15 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
         series: The metric at each time step.
         remark: Which time steps were added.
     """
-    dts, errors, resolutions, rounded = _worst_part(scene, claim, metric, series)
-    if metric.name in JUMPING:  # the step changes it by chance, as far as it has changed it at all
-        resolutions = np.maximum(resolutions, np.nanmax(errors, initial=-math.inf) - np.nanmin(errors, initial=math.inf))
-    floor = negligible(scene, metric.unit)
-    length = error_budget(dts, errors, claim.order, STANDARD_DEVIATIONS * resolutions, rounded, signed=metric.signed, negligible=floor)
+    dts, floor = np.array([point.dt for point in series]), negligible(scene, metric.unit)
+    rounded = rounding(scene, metric.unit, claim.precision, np.array([point.steps for point in series], dtype=float))
+    judged = []
+    for errors, resolutions in _worst_parts(scene, metric, series):
+        range_ = np.nanmax(errors, initial=-math.inf) - np.nanmin(errors, initial=math.inf)
+        # A step changes a jumping metric by chance, as far as it has changed it at all.
+        noise = STANDARD_DEVIATIONS * (np.maximum(resolutions, range_) if metric.name in JUMPING else resolutions)
+        judged.append((error_budget(dts, errors, claim.order, noise, rounded, signed=metric.signed, negligible=floor), errors))
+    length, errors = _worse(judged, floor)
     vector = _budget_of_components(scene, claim, metric, series, np.isfinite(errors), rounded)
     budget = length if vector is None else _corrected(length, vector, finest=abs(float(errors[np.argmin(dts)])))
     order_tolerance = math.nan
@@ -149,24 +158,46 @@ def _corrected(length: ErrorBudget, vector: ErrorBudget, finest: float) -> Error
     return length if length.cause == "model" else replace(length, upper=max(length.upper, vector.upper))
 
 
-def _worst_part(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint]) -> tuple[Array, Array, Array, Array]:
-    """Time steps, errors, their resolution and their rounding errors, of the part that is largest at the finest time step."""
-    dts, steps = np.array([point.dt for point in series]), np.array([point.steps for point in series], dtype=float)
-    averages = [point.average for point in series]
-    resolved = [average for average in averages if np.isfinite(average.parts).all()]
-    shape = min((average.parts.shape for average in resolved), default=(1,))
-    finest = averages[int(np.argmin(dts))].parts[: shape[0]]
-    worst = np.unravel_index(np.argmax(np.abs(finest)), finest.shape)
-    errors, resolutions = (
-        np.array([values[worst] if values.shape[1:] == shape[1:] else math.nan for values in both])
-        for both in zip(*(average[:2] for average in averages), strict=True)
-    )
-    rounded = rounding(scene, metric.unit, claim.precision, steps)
-    if metric.unit == "rad":
-        errors[np.abs(errors) > SATURATION] = math.nan
-    if metric.name == "position_error" and scene.starts_above_floor and scene.recording is None:
-        errors[np.abs(errors) > DESYNCHRONISED * scene.clearance] = math.nan
-    return dts, errors, resolutions, rounded
+def _worse(judged: Sequence[tuple[ErrorBudget, Array]], floor: float) -> tuple[ErrorBudget, Array]:
+    """The budget of the sign that is largest at the finest step, or of the other one if that is worse and more of it may remain.
+
+    The interval of an unresolved one contains that of the other sign, because either may be the larger one as dt → 0.
+    """
+    if len(judged) == 1:
+        return judged[0]
+    (largest, _), (other, _) = judged
+    may_remain = max(-other.lower, other.upper) > max(-largest.lower, largest.upper, floor)
+    if may_remain and WORSE.get(other.cause, 0) > WORSE.get(largest.cause, 0):
+        judged = judged[::-1]
+    (worse, errors), (other, _) = judged
+    if worse.cause == "unresolved" and not math.isnan(other.lower):
+        worse = replace(worse, lower=min(worse.lower, other.lower), upper=max(worse.upper, other.upper))
+    return worse, errors
+
+
+def _worst_parts(scene: Scenario, metric: Metric, series: Sequence[SeriesPoint]) -> list[tuple[Array, Array]]:
+    """Errors and their resolution in the flight in which they are largest at the finest time step: of that sign, and of the other one.
+
+    Flights that too few of the steps resolve count only if their error is far larger than that of the others.
+    """
+    resolved = [point for point in series if np.isfinite(point.average.parts).all()]
+    finest = min(resolved or series, key=lambda point: point.dt).average.parts
+    sizes, dts = np.abs(finest), [[point.dt for point in resolved if len(point.average.parts) > flight] for flight in range(len(finest))]
+    of_enough = sizes[: sum(map(is_sufficient, dts))]
+    among = of_enough if of_enough.max(initial=0.0) > LARGE_SHARE * sizes.max() else sizes
+    flight, *sign = map(int, np.unravel_index(np.argmax(among), among.shape))
+    found = []
+    for part in [(flight, *sign), *((flight, other) for side in sign for other in range(finest.shape[1]) if other != side)]:
+        errors, resolutions = (
+            np.array([values[part] if values.ndim == finest.ndim and len(values) > flight else math.nan for values in both])
+            for both in zip(*(point.average[:2] for point in series), strict=True)
+        )
+        if metric.unit == "rad":
+            errors[np.abs(errors) > SATURATION] = math.nan
+        if metric.name == "position_error" and scene.starts_above_floor and scene.recording is None:
+            errors[np.abs(errors) > DESYNCHRONISED * scene.clearance] = math.nan
+        found.append((errors, resolutions))
+    return found
 
 
 def _budget_of_components(

@@ -76,6 +76,36 @@ def test_irregular_convergence_is_no_model_error():
     assert "no component grows" in error.reason
 
 
+def cause_of(measured, metric="energy_error"):
+    """The cause of a ball's error, whose parts at each time step are given: a row for each flight that the step resolves."""
+    scene = ds.load("drop-ball")
+    series = [SeriesPoint(dt, scene.steps(dt), average(parts), None, 1e-9) for dt, parts in measured.items()]
+    return convergence(scene, Claim("mine", None, np.float64), ds.METRICS[metric], series).budget
+
+
+def test_flights_that_a_coarse_step_does_not_resolve_are_judged():
+    """After the impact an error of 0.26 remains. A step that resolves only the fall, which has no error, must not hide it."""
+    fall, rises = [1e-16, 0.0], {0.008: [0.263, 0.0], 0.004: [0.260, 0.0], 0.002: [0.2601, 0.0]}
+    after = {dt: [fall, rise] for dt, rise in rises.items()}
+    assert cause_of(after).cause == "model"
+    assert cause_of({0.016: [fall]} | after).cause == "model"
+    assert cause_of({0.016: [fall], 0.008: after[0.008], 0.004: after[0.004]}).cause == "unresolved"
+
+
+def test_an_error_that_changes_its_sign_at_the_finest_step_does_not_vanish():
+    """The energy is too large by a share that falls to 0 at 1 ms, where it is too small by rounding."""
+    found = cause_of({0.004: [[0.9701, 0.0]], 0.002: [[0.3334, 0.0]], 0.001: [[0.0, -3.28e-7]]})
+    assert found.cause == "unresolved"
+    assert found.upper > 0.1
+
+
+def test_the_error_of_the_other_sign_may_be_the_one_that_remains():
+    """The largest loss falls with the time step, and the smaller gain does not."""
+    steps = {0.004: [[0.002, -0.0084]], 0.002: [[0.002, -0.0042]], 0.001: [[0.002, -0.0021]]}
+    found = cause_of(steps)
+    assert (found.cause, found.asymptotic_error) == ("model", pytest.approx(0.002, rel=1e-6))
+
+
 def average(parts):
     """An average with these parts, without sampling noise."""
     return Average(np.array(parts, ndmin=1), *np.zeros((2, *np.shape(parts))))

@@ -38,6 +38,8 @@ from dropspin.comparisons.running.recording import Breakdown, divergence
 from dropspin.comparisons.running.start_phases import StartPhase, compare, measure, phases_at
 from dropspin.comparisons.running.timing import Timing
 
+VANISHING = 0.5
+"""Share of an error below which what may remain of it with finer options counts as nothing, as in an error budget."""
 FEWEST_STEPS = 8
 """A run of fewer steps is not worth adding."""
 
@@ -248,7 +250,8 @@ class EngineStudy:
 
     def _longer(self, metric: Metric, added: Sequence[float]) -> Convergence | None:
         """The convergence over the requested and other time steps; None if the engine gives no result at these."""
-        points = self._points(metric, [(dt, self.entry) for dt in added])
+        fewest = min(len(point.average.parts) for point in self.series[metric.name])  # flights that the requested steps resolve
+        points = [point for point in self._points(metric, [(dt, self.entry) for dt in added]) if len(point.average.parts) >= fewest]
         remark = f"with {' and '.join(f'{point.dt:g}' for point in points)} s added"
         return convergence(self.own.scene, self.claim, metric, [*points, *self.series[metric.name]], remark) if points else None
 
@@ -263,9 +266,11 @@ class EngineStudy:
         if len(points) == len(refined):
             finest = convergence(self.own.scene, self.claim._replace(order=None), metric, points).budget
             if not math.isnan(finest.asymptotic_error):
-                budget = finest
+                budget, remains, error = finest, max(-finest.lower, finest.upper), abs(points[-1].average.value)
                 if finest.cause not in ("model", "unresolved"):
-                    budget = replace(finest, cause=names, reason=f"vanishes with finer {names}")
+                    vanishes = remains < VANISHING * error
+                    reason = f"vanishes with finer {names}" if vanishes else f"falls with finer {names}; up to {remains:.2g} may remain"
+                    budget = replace(finest, cause=names if remains <= error else "unresolved", reason=reason)
         return found if budget.cause == "model" else replace(found, budget=replace(budget, order=math.nan), remark=path)
 
     def _points(self, metric: Metric, wanted: Sequence[tuple[float, EngineEntry]]) -> list[SeriesPoint]:

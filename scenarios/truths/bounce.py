@@ -67,7 +67,7 @@ def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
         return rows
 
     until = min(scene.duration, sideways_and_spin.horizon)
-    times = starts[1:][(starts[1:] <= until) & (u0 > 0.0)]  # a body that starts at rest on the floor does not strike it
+    times = starts[1:][starts[1:] <= until]
     before, after = states(times), states(times)
     before[:, 1] = after[:, 1] = floor_height
     after[:, 8] = speeds[1 : len(times) + 1]

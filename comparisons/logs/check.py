@@ -7,47 +7,38 @@ neither the motion nor the frames at rest tell them apart.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dropspin.comparisons.logs.falling import ALARM, RATES, flights_in_any_units
 from dropspin.comparisons.logs.flight import (
     ACCELERATION,
     OFFSET,
-    accelerations,
-    is_near,
-    noise_of,
     positions,
-    standard_error,
-    window_size,
 )
-from dropspin.comparisons.logs.flights import Flights, flights_of
+from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.log import LENGTHS, TIMES, UPRIGHT, Cause, Finding, Header, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
-from dropspin.comparisons.logs.recorded import of_floor, of_frames, of_quaternions, of_spins, orders_of_axes
+from dropspin.comparisons.logs.recorded import of_floor, of_frames, of_quaternions, of_rates, orders_of_axes
 from dropspin.comparisons.logs.rest import rests
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.bodies.inertia import is_diagonal
-from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import unrotate
-from dropspin.scenarios.state import Array
+from dropspin.scenarios.state import UP, Array
 from dropspin.scenarios.validation import validated
 
-ALARM = 1e-4
-"""Probability of a finding where there is nothing, of each value."""
 UNIT = 0.05
 """Largest relative difference from the ratio of two units."""
-RATES = (0.5, 2.0)
-"""Rates over the true one that are tried."""
+LEAST_SCALE, ON_EARTH = 5e-4, 4e-3
+"""Relative differences of gravity: the least that is a finding, and about the largest between places on the Earth."""
 CENTRES = tuple(f"centre of mass, {axis}" for axis in "xyz")
 RATIOS = ("I_x / I_y over the header's", "I_z / I_y over the header's")
 """Names of values."""
-MOST_LOG = 700.0
-"""Logarithm near that of the largest number: intervals that are wider are not determined."""
+MOST_LOG = 300.0
+"""Logarithm of which twice is near that of the largest number: values and intervals that are larger are not determined."""
 OF_SIZE, OF_RATIO, OF_DRAG = 0.1, 0.1, 0.5
 """Half widths of intervals beyond which a value counts as not identifiable: a share of the size, a logarithm, and [1/s]."""
 
@@ -121,55 +112,29 @@ def log_check(recording: Flights | Log | str | Path) -> Check:
     Raises:
         DropspinError: The recording cannot be loaded, or no toss has a free flight.
     """
-    flights = recording if isinstance(recording, Flights) else _flights(recording if isinstance(recording, Log) else load_log(recording))
+    flights = (
+        recording
+        if isinstance(recording, Flights)
+        else flights_in_any_units(recording if isinstance(recording, Log) else load_log(recording))
+    )
     drag = regression([positions(flight, with_drag=True) for flight in flights.found])
-    found = [*_of_units(flights), *of_quaternions(flights.log, flights), *of_spins(flights), *of_frames(flights)]
+    found = [*_of_units(flights), *of_quaternions(flights.log, flights), *of_rates(flights), *of_frames(flights)]
     values = tuple(_values(flights, drag))
     check = Check(values, tuple(found), tuple(_tosses(flights)), flights)
     if not check.reads_the_columns_right:
         return check
-    found += [*_of_scale(flights), *_of_offset(flights, values), *_of_inertia(flights, drag, values), *of_floor(flights, ALARM)]
+    off = list(_of_offset(flights, values))
+    if off:  # the tracked point of a body that turns fast about another point seems not to fly
+        found = [finding for finding in found if finding.kind not in ("no flight", "late")]
+    found += [*_of_scale(flights, drag), *off, *_of_inertia(flights, drag, values), *of_floor(flights, ALARM)]
     return replace(check, findings=tuple(found))
-
-
-def _flights(log: Log) -> Flights:
-    """The flights of a recording, of whatever acceleration."""
-    flights = flights_of(log, _acceleration(log, np.array([0.0, -log.header.gravity, 0.0])))
-    if flights is None:
-        needed = max(window_size(toss, noise_of(log), np.array([0.0, -log.header.gravity, 0.0])) for toss in log.tosses)
-        raise DropspinError(
-            f"{log.origin}: no toss has {needed} frames of free flight with one acceleration; film from the release on, and give "
-            "the rate of the frames."
-        )
-    return flights
-
-
-def _acceleration(log: Log, down: Array) -> Array:
-    """The free acceleration: the header's, if most tosses fall with it, else that of other units and axes that most tosses fall with."""
-    noise, offset = noise_of(log), log.header.tracked_from_centre
-
-    @cache
-    def pieces(number: int, size: int) -> Array:
-        return accelerations(log.tosses[number], size, offset)
-
-    def falling(acceleration: Array) -> int:
-        sizes = [window_size(toss, noise, acceleration) for toss in log.tosses]
-        errors = [standard_error(toss, size, noise) for toss, size in zip(log.tosses, sizes, strict=True)]
-        near = (is_near(pieces(*of_toss), acceleration, error) for of_toss, error in zip(enumerate(sizes), errors, strict=True))
-        return sum(bool(of_toss.any()) for of_toss in near)
-
-    if 2 * falling(down) > len(log.tosses):
-        return down
-    lengths, times = ({a / b for a, b in product(units.values(), repeat=2)} for units in (LENGTHS, TIMES))
-    factors = lengths | {ratio**2 for ratio in (*times, *RATES)}
-    candidates = [factor * sign * np.roll(down, turn) for factor in sorted(factors) for turn in range(3) for sign in (1.0, -1.0)]
-    candidates += [first for number, toss in enumerate(log.tosses) for first in pieces(number, window_size(toss, noise, down))[:1]]
-    return max([down, *candidates], key=falling)
 
 
 def _of_units(flights: Flights) -> Iterator[Finding]:
     """Of accelerations that are along another axis or far from gravity."""
     header, found = flights.log.header, flights.moving.values[ACCELERATION]
+    if np.linalg.norm(found + header.gravity * UP) <= np.linalg.norm(flights.moving.half_widths(ALARM)[ACCELERATION]):
+        return
     ratio, recorded = float(np.linalg.norm(found)) / header.gravity, unrotate(np.array(UPRIGHT[header.up]), -found)
     axis = int(np.argmax(np.abs(recorded)))
     up = ("-" if recorded[axis] < 0.0 else "") + "xyz"[axis]
@@ -195,16 +160,25 @@ def _rate_cause(log: Log, ratio: float) -> Cause:
     return Cause("rate", faster - 1.0, {"rate": float(f"{rate / faster:.4g}")} if log.header.rate is not None else {})
 
 
-def _of_scale(flights: Flights) -> Iterator[Finding]:
+def _falls(flights: Flights, drag: Regression, outside: float = 0.05) -> tuple[float, float]:
+    """The interval of gravity that an interval is outside of with a probability: without drag, and with it too if there is any [m/s²]."""
+    found = [flights.moving, *([drag] if drag.values[-1] > drag.half_widths()[-1] else [])]
+    middles, widths = [-one.values[1] for one in found], [one.half_widths(outside)[1] for one in found]
+    return min(np.subtract(middles, widths)), max(np.add(middles, widths))
+
+
+def _of_scale(flights: Flights, drag: Regression) -> Iterator[Finding]:
     """Of gravity that is a little too large or small, or not vertical."""
     header, found = flights.log.header, flights.moving
     x, fall, z = found.values[ACCELERATION].tolist()
-    wide = found.half_widths(ALARM)
-    ratio, error = -fall / header.gravity, wide[1] / header.gravity
-    if abs(ratio - 1.0) > error:
+    wide, (low, high) = found.half_widths(ALARM), _falls(flights, drag, ALARM)
+    ratio = -fall / header.gravity
+    if not low <= header.gravity <= high and abs(ratio - 1.0) > LEAST_SCALE:
         at_rest, spread, _, _ = rests(flights.log).scale()
         by_length, by_rate = (abs(at_rest - expected) < 4.0 * spread + 0.004 for expected in (ratio, 1.0))
+        local = Cause("local gravity", keys={"gravity": float(f"{-fall:.4g}")})
         causes = _shown((_length_cause(header, ratio), by_length), (_rate_cause(flights.log, ratio), by_rate))
+        causes += (local,) if abs(ratio - 1.0) < ON_EARTH else ()
         yield Finding("scale", -fall, header.gravity, causes=causes, rests=at_rest)
     if math.hypot(x, z) > math.hypot(wide[0], wide[2]):
         yield Finding("tilt", math.atan2(math.hypot(x, z), -fall), 0.0, causes=(Cause("axes"), Cause("push")))
@@ -278,17 +252,18 @@ def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
     """The values that flights give, each with its interval or with what it needs."""
     header, found = flights.log.header, flights.moving
     wide = found.half_widths()
-    fall, error = -float(found.values[1]), float(wide[1])
-    yield Value("gravity", fall, fall - error, fall + error, "m/s²")
-    yield Value("length scale", fall / header.gravity, (fall - error) / header.gravity, (fall + error) / header.gravity, "")
+    fall, (low, high) = -float(found.values[1]), _falls(flights, drag)
+    yield Value("gravity", fall, low, high, "m/s²")
+    yield Value("length scale", fall / header.gravity, low / header.gravity, high / header.gravity, "")
     centres = np.asarray(header.tracked_point) - found.values[OFFSET]
     widths = np.where(flights.show_offset, wide[OFFSET], np.inf)
     for name, centre, error in zip(CENTRES, centres, widths, strict=True):
         yield Value(name, centre, centre - error, centre + error, "m", OF_SIZE * header.body.size)
     turning = flights.turning
-    for name, value, error in zip(RATIOS, turning.values, turning.half_widths(), strict=True):
-        low, middle, high = (math.exp(max(min(value + step, MOST_LOG), -MOST_LOG)) for step in (-error, 0.0, error))
-        yield Value(name, middle, low, high, "", middle * math.sinh(OF_RATIO))
+    logarithms = np.clip([turning.values, turning.half_widths()], -MOST_LOG, MOST_LOG).T
+    for name, (value, error) in zip(RATIOS, logarithms.tolist(), strict=True):
+        middle = math.exp(value)
+        yield Value(name, middle, math.exp(value - error), math.exp(value + error), "", middle * math.sinh(OF_RATIO))
     rate, error = drag.values[-1], drag.half_widths()[-1]
     yield Value("drag", rate, rate - error, rate + error, "1/s", OF_DRAG)
     for name, noise, unit in (("position", found.noise, "m"), ("orientation", turning.noise, "rad")):

@@ -142,8 +142,8 @@ class Regression:
         return np.where(determined > DETERMINED, widths, np.inf)
 
 
-ROUNDING = 8.0 * float(np.finfo(float).eps)
-"""Smallest noise, as a share of the largest value: sums and products of a few terms."""
+ROUNDING = 1e-9
+"""Smallest noise, as a share of the largest value: a recording that shows less is that of a simulator, which has errors of its own."""
 DETERMINED = 0.99
 """Share of a parameter's direction that the flights determine, from which on they determine the parameter."""
 FEWEST = 5

@@ -1,7 +1,7 @@
 """Findings about how a motion was recorded: order of quaternions, frame of spins, missing and repeated frames, height of the floor."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import permutations
 
@@ -16,7 +16,7 @@ from dropspin.comparisons.logs.rotors import rotation
 from dropspin.comparisons.running.belonging import missing_frames
 from dropspin.scenarios.bodies import Body, Box, Ellipsoid
 from dropspin.scenarios.bodies.inertia import is_diagonal
-from dropspin.scenarios.rotations import conjugate, length, multiply, rotate, unrotate
+from dropspin.scenarios.rotations import conjugate, cross, length, multiply, rotate, unrotate
 from dropspin.scenarios.state import Array
 
 EXPLAINED = 0.4
@@ -25,6 +25,10 @@ LEAST_LEFT = 0.5
 """Share of the white noise of the orientations that every reading leaves."""
 MOST_ROTORS = 8
 """Flights whose rotation is tried in other readings."""
+MOST_NOISE, ALLOWED = 3.0, 0.1
+"""Multiple of the noise of recorded rates, and share of their size, up to which they agree with the motion."""
+EXPLAINED_RATES = 0.3
+"""Share of the difference that another reading of the rates leaves at most."""
 RESTS_NEAR = 0.04
 """Of the size of the body: how far above or below the floor it may rest, by errors of its own size and of tags."""
 DEGREE, BETTER = 5, 1.02
@@ -87,30 +91,62 @@ def _restlessness(left: list[Array]) -> float:
     return float(np.median([np.sqrt(np.mean(values**2)) for values in left]))
 
 
-def of_spins(flights: Flights) -> Iterator[Finding]:
-    """Of recorded spins that are in another frame or unit than the header says."""
-    pairs = []
-    for flight, rotor in zip(flights.found, flights.rotations, strict=True):
-        if flight.toss.angular_velocity is not None:
-            given, exact = flight.toss.angular_velocity[flight.rows], rotor(flight.t)[1]
-            turned = flight.toss.orientation[flight.rows]
-            pairs.append((given, exact, rotate(turned, given), unrotate(turned, given)))
-    if not pairs:
+def of_rates(flights: Flights) -> Iterator[Finding]:
+    """Of recorded velocities and spins that are not those of the positions and quaternions: in another frame or unit, or reversed."""
+    each, in_world = zip(flights.found, flights.rotations, strict=True), flights.log.header.spin_frame == "world"
+    spun = [(flight, flight.toss.angular_velocity, rotor(flight.t)[1]) for flight, rotor in each]
+    frame = Cause("spin frame", keys={"spin_frame": "body" if in_world else "world"})
+    degrees = Cause("degrees", 180.0 / math.pi - 1.0)
+    yield from _of_column("spin", spun, flights.turning.noise.white, (frame, Cause("sign of the spin")), degrees)
+    moved = [(flight, flight.toss.velocity, _velocities(flight, rates, flights.log.header)) for flight, _, rates in spun]
+    causes = Cause("velocity frame"), Cause("sign of the velocity")
+    yield from _of_column("velocity", moved, flights.moving.noise.white, causes)
+
+
+def _velocities(flight: Flight, spins: Array, header: Header) -> Array:
+    """Velocities in the rows of a flight [m/s]: of the centre of mass, or of the tracked point if the recorded ones are nearer to these."""
+    arms = rotate(flight.toss.orientation[flight.rows], header.tracked_from_centre)
+    _, first, second = np.polynomial.polynomial.polyfit(flight.t, flight.toss.position[flight.rows] - arms, 2)
+    centre = np.asarray(first + 2.0 * flight.t[:, np.newaxis] * second)
+    given = centre if flight.toss.velocity is None else flight.toss.velocity[flight.rows]
+    return min(centre, centre + cross(spins, arms), key=lambda exact: float(np.median(length(given - exact))))
+
+
+def _of_column(
+    kind: str, columns: Sequence[tuple[Flight, Array | None, Array]], white: float, causes: tuple[Cause, Cause], unit: Cause | None = None
+) -> Iterator[Finding]:
+    """Of recorded rates that differ from those of the motion.
+
+    Args:
+        kind: The kind of the finding.
+        columns: Each flight with its recorded rates, if any, and with those of the motion in its rows.
+        white: The white noise of the poses.
+        causes: That the rates are in the other frame, and that they are reversed.
+        unit: That they are in the unit that is usual beside the right one; by default, any factor is one of units.
+    """
+    known = [(flight, given[flight.rows], exact, given[flight.first : flight.end]) for flight, given, exact in columns if given is not None]
+    if not known:
         return
-    given, exact, from_body, to_body = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+    given, exact = (np.concatenate([row[field] for row in known]) for field in (1, 2))
+    turned = np.concatenate([flight.toss.orientation[flight.rows] for flight, *_ in known])
+    # Second differences of white noise are √6 times as large, and those of a motion are small.
+    noise = float(np.median(np.concatenate([length(np.diff(rates, n=2, axis=0)) for *_, rates in known]))) / math.sqrt(6.0)
+    noise += white / float(np.median([flight.duration for flight, *_ in known]))
+    size = float(np.median(length(exact))) or float(np.median(length(given)))
 
     def error(values: Array) -> float:
-        return float(np.median(length(values - exact))) / float(np.median(length(exact)))
+        return float(np.median(length(values - exact))) / size
 
-    in_world = flights.log.header.spin_frame == "world"
-    readings = (
-        (Cause("spin frame", keys={"spin_frame": "body" if in_world else "world"}), from_body if in_world else to_body),
-        (Cause("degrees"), np.radians(given)),
-        (Cause("sign of the spin"), -given),
-    )
+    if float(np.median(length(given - exact))) <= max(MOST_NOISE * noise, ALLOWED * size):
+        return
+    factor = float(np.sum(given * exact) / np.sum(exact**2))
+    unit = unit or Cause("unit of the velocity", factor - 1.0)
+    in_unit = (unit, given / (1.0 + unit.share)) if factor > 0.0 else (unit, given)
+    frame, reversed_ = causes
+    other = [rotate(turned, given), unrotate(turned, given)]
+    readings = [*((frame, values) for values in other), (reversed_, -given), in_unit]
     cause, best = min(readings, key=lambda reading: error(reading[1]))
-    if error(given) > 0.1:
-        yield Finding("spin", error(given), 0.0, causes=(cause,) if error(best) < 0.3 * error(given) else ())
+    yield Finding(kind, error(given), 0.0, causes=(cause,) if error(best) < EXPLAINED_RATES * error(given) else ())
 
 
 def _residual(flights: Flights, *, equal_steps: bool) -> float:
@@ -138,13 +174,19 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
             yield Finding("no flight", 0.0, window_size(toss, noise, flights.moving.values[ACCELERATION]), toss.name)
     for flight, weight in zip(flights.found, flights.moving.weights, strict=True):
         own = flights.moving.noise.of_weight(min(weight, 1.0))
-        after, before = (_dropped(part, flights.moving.values, own) for part in (flight, flight.backwards()))
+        backwards = flight.backwards()
+        after, before = (_dropped(part, flights.moving.values, own) for part in (flight, backwards))
+        bad_after, bad_before = (_bad_frames(part, flights.moving.values, own) for part in (flight, backwards))
         if before:
             yield Finding("frame dropped", before, 0.0, flight.toss.name, flight.first - 1)
+        elif bad_before:
+            yield Finding("bad frame", bad_before, 0.0, flight.toss.name, flight.first - 1 - bad_before)
         elif flight.first > 2:
             yield Finding("late", flight.first, 0.0, flight.toss.name, flight.first, (Cause("held"), Cause("earlier impact")))
         if after:
             yield Finding("frame dropped", after, 0.0, flight.toss.name, flight.end + 1)
+        elif bad_after:
+            yield Finding("bad frame", bad_after, 0.0, flight.toss.name, flight.end + 1)
 
 
 def _dropped(flight: Flight, shared: Array, noise: Noise) -> int:
@@ -155,6 +197,15 @@ def _dropped(flight: Flight, shared: Array, noise: Noise) -> int:
     for missing in (1, 2, 3):
         if len(frames) == 3 and all(surprise(flight, frame, shared, noise, missing * dt) < SURPRISING for frame in frames):
             return missing
+    return 0
+
+
+def _bad_frames(flight: Flight, shared: Array, noise: Noise) -> int:
+    """How many frames at the end of a flight are not of it, although the ones after them are; 0 if none."""
+    for bad in (1, 2, 3):
+        frames = range(flight.end + 1 + bad, min(flight.end + 4 + bad, len(flight.toss)))
+        if len(frames) == 3 and all(surprise(flight, frame, shared, noise) < SURPRISING for frame in frames):
+            return bad
     return 0
 
 

@@ -15,7 +15,9 @@ from dropspin.scenarios.rotations import length, rotate, rotation_vector, unrota
 from dropspin.scenarios.state import UP, Array
 
 STILL = 0.005
-"""Largest movement of frames at rest, as a share of the body's size, and largest turn [rad]."""
+"""Largest movement from some frames at rest to the next ones beside noise, as a share of the body's size, and largest turn [rad]."""
+MOST_NOISE = 4.0
+"""Multiple of it that the noise of frames at rest may be."""
 FEWEST_FRAMES = 5
 """Frames at rest that a toss needs."""
 FEWEST_RESTS = 6
@@ -82,9 +84,14 @@ def level_share(log: Log) -> tuple[float, int]:
 
 
 def _is_still(toss: Toss, size: float) -> bool:
-    last = slice(-FEWEST_FRAMES, None)
+    """Whether the mean pose of the last frames is that of the frames before them, but for noise, which is not large."""
     if len(toss) < 2 * FEWEST_FRAMES:
         return False
-    moved = length(toss.position[last] - toss.position[-1]).max()
-    turned = length(rotation_vector(toss.orientation[last], np.broadcast_to(toss.orientation[-1], (FEWEST_FRAMES, 4)))).max()
-    return bool(moved < STILL * size and turned < STILL)
+    last = slice(-2 * FEWEST_FRAMES, None)
+    turns = rotation_vector(np.broadcast_to(toss.orientation[-1], (2 * FEWEST_FRAMES, 4)), toss.orientation[last])
+    poses = np.stack([toss.position[last] / size, turns]).reshape(2, 2, FEWEST_FRAMES, 3)
+    means = poses.mean(axis=2)
+    spread = np.sqrt(np.mean(length(poses - means[:, :, np.newaxis]) ** 2, axis=(1, 2)))
+    moved = length(means[:, 1] - means[:, 0])
+    # Uniform motion moves the mean by 3.5 times the spread, and noise by 0.6 times.
+    return bool((spread < MOST_NOISE * STILL).all() and (moved < STILL + spread).all())

@@ -19,9 +19,11 @@ KINDS = {
     "quaternion": "the quaternions have another order than the header says, or describe the inverse rotation",
     "body axes": "the body does not turn as that of the header does",
     "spin": "the recorded angular velocity differs by {percent:.0f} % from that of the quaternions",
+    "velocity": "the recorded velocity differs by {percent:.0f} % from that of the positions",
     "floor": "bodies at rest are {mm_off:.4g} mm {side} the floor of the header",
     "no flight": "toss {toss}: no free flight of at least {expected:.0f} frames",
     "frame dropped": "toss {toss}: number of frames missing before frame {frame}: {value:.0f}",
+    "bad frame": "toss {toss}, frame {frame}: number of frames that are off the flight that continues after them: {value:.0f}",
     "late": "toss {toss}: the free flight begins only at frame {frame}",
     "repeated": "toss {toss}, frame {frame}: number of rows that repeat the previous row while the body moves: {value:.0f}",
     "gap": "toss {toss}, frame {frame}: number of frames missing before it, according to the times: {value:.0f}",
@@ -33,6 +35,7 @@ CAUSES = {
     "time unit": "times are in {key}",
     "length scale": "lengths are {ratio:.4g} times the true ones",
     "rate": "the rate is {ratio:.4g} times the true one",
+    "local gravity": "the local gravity differs",
     "centre of mass": "the centre of mass is at {key} m",
     "tracked point": "the tracked point is at {key} m",
     "axes": "the axes are tilted",
@@ -42,6 +45,9 @@ CAUSES = {
     "spin frame": "it is in the {key} frame",
     "degrees": "it is in degrees per second",
     "sign of the spin": "its sign is reversed",
+    "velocity frame": "it is in the body frame",
+    "sign of the velocity": "its sign is reversed",
+    "unit of the velocity": "it is {ratio:.4g} times the true one",
     "held": "the body is held until then",
     "earlier impact": "the flight follows an impact",
     "times": "the column t is wrong",
@@ -57,6 +63,7 @@ REMEDIES = {
     "drag": "engines simulate no air; shorter falls or a denser body reduce the effect of drag",
     "no flight": "begin the recording when the body is released",
     "frame dropped": "give the exact time of each frame in a column t",
+    "bad frame": "leave out these rows",
     "repeated": "leave out rows that were not measured",
     "jitter": "give the exact time of each frame; or, if the frames are evenly spaced, leave out the column t and give rate in the header",
     "rate": "multiply the times t by {ratio:.4g}",
@@ -65,6 +72,9 @@ REMEDIES = {
     "body axes": "record orientations of axes that the shape has in dropspin: y along a capsule or a cylinder",
     "degrees": "multiply wx, wy, wz by π/180",
     "sign of the spin": "change the sign of wx, wy, wz",
+    "velocity frame": "rotate vx, vy, vz into the frame of the positions",
+    "sign of the velocity": "change the sign of vx, vy, vz",
+    "unit of the velocity": "divide vx, vy, vz by {ratio:.4g}",
     "held": "leave out the rows before frame {frame}",
     "earlier impact": "begin the recording when the body is released",
     "times": "leave out the column t",
@@ -125,7 +135,7 @@ def corrections(recording: str, findings: Iterable[Finding]) -> list[str]:
 def _words(cause: Cause) -> str:
     """A cause in words; empty if its keys state it."""
     text = CAUSES.get(cause.name, "")
-    if abs(cause.share) <= 0.5:
+    if cause.name in LESS_OR_MORE and abs(cause.share) <= 0.5:
         text = LESS_OR_MORE[cause.name][cause.share > 0.0]
     key = next((_toml(value).strip('"') for value in cause.keys.values()), "")
     return text.format(key=key, ratio=1.0 + cause.share, percent=100.0 * abs(cause.share))

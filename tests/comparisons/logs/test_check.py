@@ -257,3 +257,98 @@ def test_what_is_not_identifiable_gives_neither_a_finding_nor_a_remedy() -> None
     assert found.kind == "inertia, z"
     before, after = np.array(flights.log.header.body.moments), np.array(cure(found)["body.inertia"])
     np.testing.assert_allclose(after / before, [1.0, 1.0, np.exp(-0.4)])
+
+
+def with_rates(log: Log, noise: float = 0.0) -> Log:
+    """The recording with velocities and spins, which have a noise [m/s, rad/s]."""
+    random, flights = np.random.default_rng(4), flights_of(log, np.array([0.0, -9.81, 0.0]))
+    assert flights is not None
+    tosses = []
+    for toss, rotor in zip(log.tosses, flights.rotations, strict=True):
+        velocity, spin = np.gradient(toss.position, toss.t, axis=0), rotor(toss.t - toss.t[0])[1]
+        noises = noise * random.normal(size=(2, *velocity.shape))
+        tosses.append(replace(toss, velocity=velocity + noises[0], angular_velocity=spin + noises[1]))
+    return replace(log, tosses=tuple(tosses))
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        (lambda toss: 100.0 * toss.velocity, "unit of the velocity"),
+        (lambda toss: -toss.velocity, "sign of the velocity"),
+        (lambda toss: unrotate(toss.orientation, toss.velocity), "velocity frame"),
+    ],
+)
+def test_velocities_that_are_not_those_of_the_positions_are_named(change: Callable[[Toss], Any], cause: str) -> None:
+    log = with_rates(sound())
+    assert log_check(log).findings == ()
+    found = only(log_check(changed(log, velocity=change)))
+    assert (found.kind, [one.name for one in found.causes]) == ("velocity", [cause])
+
+
+@pytest.mark.parametrize("spin", [0.0, 0.2])
+def test_spins_that_differ_by_their_noise_agree(spin: float) -> None:
+    """Of bodies that do not turn, or hardly, the noise is as large as the spin, or infinitely larger."""
+    assert log_check(with_rates(sound(spin=spin), noise=0.1)).findings == ()
+
+
+def test_spins_of_exactly_zero_agree_with_quaternions_that_do_not_turn() -> None:
+    log = changed(made(1, 5, spin=0.0, header={"body": CUBE}).log, angular_velocity=lambda toss: np.zeros_like(toss.position))
+    assert not [found for found in log_check(log).findings if found.kind == "spin"]
+
+
+def test_a_short_sound_recording_has_no_finding() -> None:
+    """Twelve frames of one flight do not determine gravity within 20 %."""
+    for seed in range(6):
+        log = sound(seed, count=1)
+        assert log_check(replace(log, tosses=tuple(replace_rows(toss, slice(0, 12)) for toss in log.tosses))).findings == ()
+
+
+def replace_rows(toss: Toss, rows: slice) -> Toss:
+    return replace(toss, t=toss.t[rows], position=toss.position[rows], orientation=toss.orientation[rows])
+
+
+def test_drag_is_no_error_of_lengths() -> None:
+    """A rate of 0.1 1/s changes the fall as a gravity that is 1 to 2 % smaller does; the interval contains the true one."""
+    log = made(3, 12, (1e-4, 1e-3), durations=(0.4, 0.6), header={"body": CUBE}).log
+    slowed = changed(log, position=lambda toss: toss.position - 0.1 * _twice_integrated(toss))
+    check = log_check(slowed)
+    assert {found.kind for found in check.findings} == {"drag"}
+    gravity = next(value for value in check.values if value.name == "gravity")
+    assert gravity.value < 9.75
+    assert gravity.low < 9.81 < gravity.high
+
+
+def _twice_integrated(toss: Toss) -> Any:
+    """The integral of the path from the start on, which is that of the velocity twice [m s]."""
+    way = toss.position - toss.position[0]
+    steps = 0.5 * (way[1:] + way[:-1]) * np.diff(toss.t)[:, np.newaxis]
+    return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+
+
+def test_a_bad_frame_is_named_and_not_a_late_flight() -> None:
+    log = made(1, 10, NOISE, durations=(0.3, 0.4), header={"body": CUBE}).log
+    bad = log.tosses[3].position.copy()
+    bad[12] += [0.02, 0.0, 0.0]
+    tosses = (*log.tosses[:3], replace(log.tosses[3], position=bad), *log.tosses[4:])
+    found = only(log_check(replace(log, tosses=tosses)))
+    assert (found.kind, found.toss, found.frame, found.value) == ("bad frame", log.tosses[3].name, 12, 1.0)
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+def test_a_body_that_rests_or_slides_does_not_fly(speed: float) -> None:
+    """A deceleration along the floor is no gravity."""
+    t, random = np.arange(80) / 148.0, np.random.default_rng(2)
+    ways = np.stack([speed * t - 1.5 * speed * t**2 / 2.0, np.full(80, CUBE["half_extents"][1]), 0.0 * t], axis=1)
+    tosses = [
+        Toss(str(number), t, ways + 2e-4 * random.normal(size=ways.shape), np.tile([0.0, 0.0, 0.0, 1.0], (80, 1))) for number in range(5)
+    ]
+    log = replace(sound(), tosses=tuple(tosses))
+    with pytest.raises(DropspinError, match="free flight with one acceleration"):
+        log_check(log)
+
+
+def test_gravity_of_another_place_is_a_cause() -> None:
+    found = only(log_check(made(2, 12, (1e-4, 1e-3), gravity=9.78, durations=(0.4, 0.6), header={"body": CUBE}).log))
+    assert found.kind == "scale"
+    assert found.causes[-1].keys == {"gravity": pytest.approx(9.78, abs=0.005)}

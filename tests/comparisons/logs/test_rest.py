@@ -88,3 +88,20 @@ def test_height_above_the_floor_needs_several_rests() -> None:
     assert above == pytest.approx(0.0, abs=1.1e-3)
     assert error == pytest.approx(1e-3 * np.sqrt(28.0 / 5.0 / 6.0), rel=1e-9)
     assert np.isnan(Rests(*(part[:5] for part in found)).above()).all()
+
+
+def test_bodies_at_rest_are_recognised_beside_noise_and_bodies_that_move_are_not() -> None:
+    """At the noise of tags, and at a hundredth of the size in 0.1 s, which is ten times the noise."""
+    random, log = np.random.default_rng(3), resting(1.0, np.zeros(3))
+    noisy = [
+        replace(toss, position=toss.position + 2e-4 * random.normal(size=(12, 3)), orientation=_noisy(toss.orientation, 2e-3, random))
+        for toss in log.tosses
+    ]
+    assert len(rests(replace(log, tosses=tuple(noisy))).heights) == 6
+    moving = [replace(toss, position=toss.position + 0.02 * toss.t[:, np.newaxis] * np.array([1.0, 0.0, 0.0])) for toss in noisy]
+    assert len(rests(replace(log, tosses=tuple(moving))).heights) == 0
+
+
+def _noisy(orientations: Array, noise: float, random: np.random.Generator) -> Array:
+    turned = orientations + noise / 2.0 * random.normal(size=orientations.shape)
+    return turned / np.linalg.norm(turned, axis=1, keepdims=True)

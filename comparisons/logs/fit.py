@@ -1,6 +1,6 @@
 """The friction and restitution with which engines best match a recording, from the frames after the first contact of each toss."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
@@ -16,7 +16,9 @@ from dropspin.comparisons.logs.intervals import LEVEL, expanded
 from dropspin.comparisons.logs.log import Log
 from dropspin.comparisons.logs.replay import flights_in, of_each_engine
 from dropspin.comparisons.running.entries import engine_entries
-from dropspin.comparisons.running.processes import FIVE_MINUTES, ResourceLimits
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.processes import FIVE_MINUTES, EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios.ensemble import clearances
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION
@@ -25,6 +27,12 @@ ANY_ENGINE = "any engine"
 ENGINES = ("mujoco", "wang[contact=sequential,law=coulomb]")
 FRAMES = 8
 """Frames after the last one of the flight."""
+STEPS_PER_FRAME = 32, 64
+"""Time steps of the engines in a frame: an impact is up to a step late, so that restitution is fitted too large by a part that falls with
+the step. What is left of it at the finer step is about the difference between the two.
+"""
+Steps = tuple[Profile, Profile]
+"""The estimates of an engine at the coarser and at the finer time step."""
 EQUAL = 0.02
 """Difference of a parameter between engines that may be neglected: in a restitution of 0.4, it changes a rebound's height by a tenth."""
 
@@ -131,20 +139,35 @@ def log_fit(
     Raises:
         DropspinError: The recording has no floor, or too few tosses with frames after a flight.
     """
-    entries, problem = engine_entries(engines, ENGINES), problem_of(flights_in(recording), frames)
-    profiles, left_out = of_each_engine(entries, partial(profile_of, problem), on_progress, resources, jobs)
-    size, friction = len(problem.measured), None
+    entries, flights = engine_entries(engines, ENGINES), flights_in(recording)
+    problems = [problem_of(flights, frames, steps) for steps in STEPS_PER_FRAME]
+    fitted, left_out = of_each_engine(entries, partial(_profiles, problems), on_progress, resources, jobs)
+    size, friction = len(problems[0].measured), None
     estimates: list[Estimate] = []
     transfers: list[Transfer] = []
     for parameter in FIRST_GRID:
-        of_each = {label: _estimate(label, parameter, profile, size) for label, profile in profiles.items()}
-        identified = {label: profiles[label] for label, one in of_each.items() if one.has_lower or one.has_upper}
+        of_each = {label: _estimate(label, parameter, profiles, size) for label, profiles in fitted.items()}
+        bounded = {label: fitted[label] for label, one in of_each.items() if one.has_lower and one.has_upper}
         estimates += of_each.values()
-        transfers += [_transfer(parameter, *pair, identified, size) for pair in combinations(identified, 2)]
-        if parameter == "friction" and len(identified) > 1:
-            friction = _of_all(parameter, identified, size)
-    discrepancies = {label: profile.discrepancy for label, profile in profiles.items()}
-    return LogFit(size, frames, tuple(estimates), tuple(transfers), friction, discrepancies, left_out, _touches(problem))
+        transfers += [_transfer(parameter, *pair, bounded, size) for pair in combinations(bounded, 2)]
+        if parameter == "friction" and len(bounded) > 1:
+            friction = _of_all(parameter, bounded, size)
+    discrepancies = {label: finer.discrepancy for label, (_, finer) in fitted.items()}
+    return LogFit(size, frames, tuple(estimates), tuple(transfers), friction, discrepancies, left_out, _touches(problems[0]))
+
+
+def _profiles(
+    problems: Sequence[Problem], entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]
+) -> Steps | Breakdown:
+    """The estimates of an engine at the two time steps."""
+    found = []
+    for problem in problems:
+        profile = profile_of(problem, entry, processes, report)
+        if isinstance(profile, Breakdown):
+            return profile
+        found.append(profile)
+    coarser, finer = found
+    return coarser, finer
 
 
 def _touches(problem: Problem) -> bool:
@@ -154,31 +177,36 @@ def _touches(problem: Problem) -> bool:
     return bool(clearances(poses, body.vertices, body.semi_axes).min() < NEAR_FLOOR * body.size)
 
 
-def _estimate(label: str, parameter: str, profile: Profile, size: int) -> Estimate:
-    """A parameter of an engine, from the tosses and their resamples."""
-    tried, column = FIRST_GRID[parameter], list(FIRST_GRID).index(parameter)
-    lower, upper = expanded(profile.lower[:, column], profile.upper[:, column], size)
-    return Estimate(label, parameter, float(profile.value[column]), lower, upper, bool(lower > tried[0]), bool(upper < tried[-1]))
+def _estimate(label: str, parameter: str, profiles: Steps, size: int) -> Estimate:
+    """A parameter of an engine at the finer step, from the tosses and their resamples; its interval contains the effect of the step."""
+    tried, column, (coarser, finer) = FIRST_GRID[parameter], list(FIRST_GRID).index(parameter), profiles
+    lower, upper = expanded(finer.lower[:, column], finer.upper[:, column], size)
+    has_lower, has_upper = bool(lower > tried[0]), bool(upper < tried[-1])
+    by_step = abs(float(finer.value[column] - coarser.value[column])) if has_lower and has_upper else 0.0
+    lower, upper = max(lower - by_step, float(tried[0])), min(upper + by_step, float(tried[-1]))
+    return Estimate(label, parameter, float(finer.value[column]), lower, upper, has_lower, has_upper)
 
 
-def _transfer(parameter: str, first: str, second: str, profiles: Mapping[str, Profile], size: int) -> Transfer:
+def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Steps], size: int) -> Transfer:
     """The difference of a parameter between two engines, resample by resample, at both ends of the values that are as good as the best."""
-    column, one, other = list(FIRST_GRID).index(parameter), profiles[first], profiles[second]
+    column, (coarse, one), (other_coarse, other) = list(FIRST_GRID).index(parameter), fitted[first], fitted[second]
     ends = np.stack([one.lower - other.lower, one.upper - other.upper])[..., column]
     lower, upper = expanded(ends.min(axis=0), ends.max(axis=0), size)
+    by_step = abs(float((one.value - coarse.value - other.value + other_coarse.value)[column]))
+    lower, upper = lower - by_step, upper + by_step
     differs, is_equal = lower > 0.0 or upper < 0.0, max(-lower, upper) <= EQUAL
     verdict = "equal" if is_equal else "different" if differs else "undecided"
     return Transfer(parameter, first, second, float(one.value[column] - other.value[column]), lower, upper, verdict)
 
 
-def _of_all(parameter: str, profiles: Mapping[str, Profile], size: int) -> Estimate:
+def _of_all(parameter: str, fitted: Mapping[str, Steps], size: int) -> Estimate:
     """A parameter whichever engine continues the tosses, as the mean over engines that differ at random.
 
     The variance of the mean is that of resamples of the tosses and that of the engines; Student's t has the degrees of freedom of both.
     """
     column = list(FIRST_GRID).index(parameter)
-    values = np.array([profile.value[column] for profile in profiles.values()])
-    resampled = np.mean([0.5 * (profile.lower + profile.upper)[:, column] for profile in profiles.values()], axis=0)
+    values = np.array([finer.value[column] for _, finer in fitted.values()])
+    resampled = np.mean([0.5 * (finer.lower + finer.upper)[:, column] for _, finer in fitted.values()], axis=0)
     variances = np.array([resampled.var() * size / (size - 1), values.var(ddof=1) / len(values)])
     freedom = variances.sum() ** 2 / np.sum(variances**2 / [size - 1, len(values) - 1])
     half = float(stdtrit(freedom, 0.5 * (1.0 + LEVEL)) * np.sqrt(variances.sum()))

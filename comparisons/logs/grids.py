@@ -11,11 +11,9 @@ those of several impacts, keep their weight beside those that one value fits wel
 """
 
 from collections.abc import Callable
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.intervals import resamples
@@ -37,8 +35,10 @@ MARGIN = 0.25
 """Of a finer grid beside the estimates of the resamples, as a share of the distance of two values of the coarser one."""
 CORE = 0.2
 """Share of the resamples on either side of the dense part of a grid."""
-FINE_ENOUGH, FINEST = 1.0, 1e-3
-"""Distance of two values of the dense part over its width, and the distance below which no finer grid is needed."""
+FINE_ENOUGH, FINEST, FINEST_BOUND = 1.0, 1e-3, 1e-2
+"""Distance of two values of the dense part over its width, and the distances below which no finer grid is needed: around estimates, and
+around the bound of those that have one bound alone.
+"""
 SHARE, LIMIT = 0.9, 2.0
 """The share of the tosses whose q is at most the limit, by the choice of δ; the engine that made the tosses leaves q near 1."""
 ROUNDS = 3
@@ -77,14 +77,14 @@ class Profile(NamedTuple):
     discrepancy: float
 
 
-def problem_of(flights: Flights, frames: int) -> Problem:
-    """What all engines are given."""
+def problem_of(flights: Flights, frames: int, steps: int) -> Problem:
+    """What all engines are given, with a number of time steps in a frame."""
     header, starts = flights.log.header, usable(flights, frames)
-    scene, dt = scene_of(header), time_step(starts)
+    scene, dt = scene_of(header), time_step(starts, steps)
     launched = launches(scene, starts, np.array([start.state for start in starts]), dt, frames)
-    steps = [np.linalg.eigh(start.covariance) for start in starts]
+    deviations = [np.linalg.eigh(start.covariance) for start in starts]
     moved = np.concatenate(
-        [start.moved((vectors * np.sqrt(np.maximum(values, 0.0))).T) for start, (values, vectors) in zip(starts, steps, strict=True)]
+        [start.moved((vectors * np.sqrt(np.maximum(values, 0.0))).T) for start, (values, vectors) in zip(starts, deviations, strict=True)]
     )
     perturbed = launches(scene, [start for start in starts for _ in range(12)], moved, dt, frames)
     noise = np.repeat([flights.moving.noise.white, header.body.size * flights.turning.noise.white], 3)
@@ -161,22 +161,30 @@ def _best(losses: Array, axes: tuple[Array, ...], counts: Array) -> tuple[Array,
 
 
 def _interpolation(axis: Array) -> tuple[Array, Array]:
-    """Values between those of a grid, and the matrix that interpolates to them."""
-    between = np.concatenate([np.linspace(low, high, FINER, endpoint=False) for low, high in pairwise(axis)] + [axis[-1:]])
-    return between, make_interp_spline(axis, np.eye(len(axis)))(between)
+    """Values between those of a grid, and the matrix that interpolates to them, on chords: a curve has minima beside a kink."""
+    between = np.interp(np.arange(FINER * (len(axis) - 1) + 1) / FINER, np.arange(len(axis)), axis)
+    return between, np.stack([np.interp(between, axis, one) for one in np.eye(len(axis))], axis=1)
 
 
 def _refined(axis: Array, tried: Array, lower: Array, upper: Array) -> Array | None:
     """A grid around the estimates of almost all resamples, dense around those of most; None if the grid is fine enough.
 
-    `tried` is the first grid, beyond which no value is.
+    `tried` is the first grid, beyond which no value is. If estimates are bounded on one side alone, it is dense around this bound, from the
+    last value that is excluded.
     """
     low, core_low = (float(value) for value in np.quantile(lower, [0.005, CORE]))
     core_high, high = (float(value) for value in np.quantile(upper, [1.0 - CORE, 0.995]))
+    from_below, from_above = core_low > tried[0], core_high < tried[-1]
+    is_bound = from_below != from_above
+    if is_bound and from_below:
+        core_low, core_high = float(axis[max(0, np.searchsorted(axis, low) - 1)]), float(np.quantile(lower, 1.0 - CORE))
+    elif is_bound:
+        core_low, core_high = float(np.quantile(upper, CORE)), float(axis[min(len(axis) - 1, np.searchsorted(axis, high, side="right"))])
     step = float(np.diff(axis)[max(0, np.searchsorted(axis, core_low) - 1) : np.searchsorted(axis, core_high) + 1].max())
     encloses = (axis[0] < low or axis[0] == tried[0]) and (high < axis[-1] or axis[-1] == tried[-1])
-    if encloses and step <= max(FINE_ENOUGH * (core_high - core_low), FINEST):
+    if encloses and step <= (FINEST_BOUND if is_bound else max(FINE_ENOUGH * (core_high - core_low), FINEST)):
         return None
-    margin = MARGIN * step
-    first, begin, end, last = np.clip([low - margin, core_low - margin, core_high + margin, high + margin], tried[0], tried[-1])
+    margin = (0.0 if encloses else step) if is_bound else MARGIN * step
+    ends = [min(low, core_low) - margin, core_low - margin, core_high + margin, max(high, core_high) + margin]
+    first, begin, end, last = np.clip(ends, tried[0], tried[-1])
     return np.unique([first, *np.linspace(begin, end, GRID - 2), last])

@@ -255,6 +255,6 @@ def _padded(rows: Sequence[Array]) -> Array:
     return found
 
 
-def time_step(starts: Sequence[Start]) -> float:
-    """The time step of the engines [s]."""
-    return float(np.median(np.concatenate([np.diff(start.toss.t) for start in starts]))) / STEPS_PER_FRAME
+def time_step(starts: Sequence[Start], steps: int = STEPS_PER_FRAME) -> float:
+    """The time step of the engines [s], for a number of steps in a frame."""
+    return float(np.median(np.concatenate([np.diff(start.toss.t) for start in starts]))) / steps

@@ -10,7 +10,7 @@ import numpy as np
 
 from dropspin.comparisons.logs.fit import log_fit
 from support.in_process import engines_in_process
-from support.log_fits import WANG, tosses
+from support.log_fits import FINE, WANG, tosses
 
 RECORDINGS, COUNTS, OTHER, SEED = 200, (10, 20, 50), "mujoco", 2026
 FRICTION, RESTITUTION = (0.1, 0.4), (0.2, 0.6)
@@ -23,7 +23,7 @@ def outcome(count, number):
     random = np.random.default_rng([SEED, count, number])
     truth = {"friction": random.uniform(*FRICTION), "restitution": random.uniform(*RESTITUTION)}
     with engines_in_process():
-        fit = log_fit(tosses(random, count, WANG, **truth), [WANG, OTHER], jobs=1)
+        fit = log_fit(tosses(random, count, WANG, **truth, dt=FINE), [WANG, OTHER], jobs=1)
     of_each = {(one.parameter, one.engine): one for one in fit.estimates}
     asked = [of_each["friction", WANG], of_each["restitution", WANG], of_each["friction", OTHER], fit.friction]
     [verdict] = [one.verdict for one in fit.transfers if one.parameter == "restitution"]

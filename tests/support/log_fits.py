@@ -15,6 +15,8 @@ from dropspin.scenarios.variations import with_values
 
 WANG = "wang[contact=sequential,law=coulomb]"
 RATE, FLIGHT, FRAMES = 148.0, 30, 8
+FINE = 1.0 / RATE / 256
+"""A time step that is much finer than those of a fit [s]."""
 WHITE = np.repeat([2e-4, 2e-3], 3)
 """Noise of positions [m] and of rotation vectors [rad]."""
 HEADER = Header(

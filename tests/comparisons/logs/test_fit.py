@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from support.log_fits import WANG, tosses
+from support.log_fits import FINE, WANG, tosses
 
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.logs import fit as log_fits
 from dropspin.comparisons.logs.fit import log_fit
 from dropspin.comparisons.logs.grids import Profile, problem_of
 from dropspin.comparisons.logs.grids import _refined as refined_grid
+from dropspin.comparisons.logs.log import Header, Log, Toss
 from dropspin.scenarios.variations import with_values
 
 
@@ -48,7 +49,7 @@ def estimates(fit, engine=None):
 def test_engine_finds_its_own_friction_and_restitution_from_ten_tosses(seeds, least):
     hits = []
     for seed in seeds:
-        found = estimates(log_fit(tosses(np.random.default_rng(seed), 10, WANG, 0.25, 0.4), WANG, jobs=1))
+        found = estimates(log_fit(tosses(np.random.default_rng(seed), 10, WANG, 0.25, 0.4, dt=FINE), WANG, jobs=1))
         hits += [
             found["friction"].lower <= 0.25 <= found["friction"].upper,
             found["restitution"].lower <= 0.4 <= found["restitution"].upper,
@@ -62,7 +63,7 @@ def test_engine_finds_its_own_friction_and_restitution_from_ten_tosses(seeds, le
 def test_restitution_transfers_to_the_engine_under_another_name_alone():
     """The impact of another engine needs another coefficient for the same rebounds; and an engine that breaks costs its own row."""
     renamed, breaking = Renamed(OPTIONS), Breaking(OPTIONS)
-    fit = log_fit(tosses(np.random.default_rng(5), 12, WANG, 0.25, 0.5), [WANG, "mujoco", renamed, breaking], jobs=1)
+    fit = log_fit(tosses(np.random.default_rng(5), 12, WANG, 0.25, 0.5, dt=FINE), [WANG, "mujoco", renamed, breaking], jobs=1)
     verdicts = {(one.parameter, one.first, one.second): one.verdict for one in fit.transfers}
     assert verdicts[("restitution", WANG, "mujoco")] == verdicts[("restitution", "mujoco", renamed.label)] == "different"
     assert verdicts[("restitution", WANG, renamed.label)] == verdicts[("friction", WANG, renamed.label)] == "equal"
@@ -93,12 +94,45 @@ def test_friction_of_any_engine_has_the_interval_of_a_mean_over_engines():
 
 
 def profile(resampled, value):
-    return Profile(resampled, resampled, np.full(2, value), 0.0)
+    """The same at both time steps."""
+    return (Profile(resampled, resampled, np.full(2, value), 0.0),) * 2
+
+
+def bouncing_balls(seed, restitution, friction, count=12, rate=148.0):
+    """Tosses of a ball of 0.1 m, in closed form: it strikes the floor once, and its contact sticks if friction suffices."""
+    random, tosses, radius = np.random.default_rng(seed), [], 0.05
+    for number in range(count):
+        height, forward = random.uniform(0.4, 0.7), random.uniform(0.3, 1.2)
+        falls = np.sqrt(2.0 * height / 9.81)
+        lost = min(friction * (1.0 + restitution) * 9.81 * falls, 2.0 / 7.0 * forward)
+        t = np.arange(int((falls + 0.1) * rate)) / rate
+        since = np.maximum(t - falls, 0.0)
+        rising = radius + restitution * 9.81 * falls * since - 4.905 * since**2
+        y = np.where(t > falls, rising, radius + height - 4.905 * t**2)
+        position = np.stack([forward * t - lost * since, y, 0.0 * t], axis=1) + 2e-4 * random.normal(size=(len(t), 3))
+        angle = -2.5 * lost / radius * since
+        quaternion = np.stack([0.0 * t, 0.0 * t, np.sin(angle / 2.0), np.cos(angle / 2.0)], axis=1)
+        quaternion[:, :3] += 5e-4 * random.normal(size=(len(t), 3))
+        tosses.append(Toss(str(number), t, position, quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)))
+    body = {"shape": "sphere", "radius": radius, "mass": 0.3}
+    header = Header(data="balls.npz", rate=rate, body=body, floor={"friction": 0.5, "restitution": 0.5})
+    return Log(header, tuple(tosses), "balls", ())
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("restitution", [0.3, 0.6, 0.9])
+def test_coefficients_of_a_ball_in_closed_form(restitution):
+    """The time step of the fit does not raise the restitution; contacts that stick bound friction from below alone."""
+    [friction, found] = log_fit(bouncing_balls(1, restitution, 0.9), WANG, jobs=1).estimates
+    assert found.lower < restitution < found.upper
+    assert found.upper - found.lower < 0.02
+    assert (friction.has_lower, friction.has_upper) == (True, False)
+    assert friction.lower < 0.1  # 2/7 v / ((1 + e) u) is at most 0.07 to 0.1
 
 
 @pytest.mark.parametrize("end", [0.0, 1.0])
 def test_grid_around_estimates_at_the_end_of_the_first_grid_has_all_of_its_values(end):
-    """Without the values beyond it, a cubic spline through the others needs at least four."""
+    """Without the values beyond it."""
     first = np.linspace(0.0, 1.0, 7)
     found = refined_grid(first, first, np.full(50, end), np.full(50, end))
     assert len(found) == 5
@@ -108,12 +142,12 @@ def test_grid_around_estimates_at_the_end_of_the_first_grid_has_all_of_its_value
 
 @pytest.mark.parametrize(("height", "touches"), [(0.0, True), (0.3, False)])
 def test_frames_in_which_no_body_is_near_the_floor_are_known(height, touches):
-    assert log_fits._touches(problem_of(tosses(np.random.default_rng(4), 8, WANG, 0.3, 0.3, height=height), 8)) is touches
+    assert log_fits._touches(problem_of(tosses(np.random.default_rng(4), 8, WANG, 0.3, 0.3, height=height, dt=FINE), 8, 4)) is touches
 
 
 @pytest.mark.extended
 def test_engine_with_half_of_the_friction_needs_twice_as_much():
-    found = estimates(log_fit(tosses(np.random.default_rng(6), 10, WANG, 0.2, 0.4), HalfFriction(OPTIONS), jobs=1))
+    found = estimates(log_fit(tosses(np.random.default_rng(6), 10, WANG, 0.2, 0.4, dt=FINE), HalfFriction(OPTIONS), jobs=1))
     assert found["friction"].value == pytest.approx(0.4, abs=0.02)
     assert found["restitution"].value == pytest.approx(0.4, abs=0.02)
 
@@ -121,9 +155,9 @@ def test_engine_with_half_of_the_friction_needs_twice_as_much():
 @pytest.mark.extended
 def test_parameter_without_effect_is_not_identified():
     """MuJoCo's default contacts do not use the restitution; and tosses without a contact in these frames bound neither."""
-    fit = log_fit(tosses(np.random.default_rng(7), 8, "mujoco[profile=default]", 0.3, 0.3), "mujoco[profile=default]", jobs=1)
+    fit = log_fit(tosses(np.random.default_rng(7), 8, "mujoco[profile=default]", 0.3, 0.3, dt=FINE), "mujoco[profile=default]", jobs=1)
     assert not estimates(fit)["restitution"].has_lower
     assert not estimates(fit)["restitution"].has_upper
     assert estimates(fit)["friction"].lower <= 0.3 <= estimates(fit)["friction"].upper
-    in_flight = tosses(np.random.default_rng(8), 8, WANG, 0.3, 0.3, height=1.0)
+    in_flight = tosses(np.random.default_rng(8), 8, WANG, 0.3, 0.3, height=1.0, dt=FINE)
     assert not any(one.has_lower or one.has_upper for one in log_fit(in_flight, WANG, jobs=1).estimates)

@@ -158,7 +158,8 @@ def test_check_prints_the_cause_first(capsys):
     found = failures(checked.results, "b.toml")
     print_document(document(checked, found, "out/run", None))
     assert capsys.readouterr().out.startswith("Possible cause of the asymptotic errors of mine: gravity 1 % too high.\n✗ ")
-    assert "\n- Possible cause of the asymptotic errors of mine: gravity 1 % too high.\n- ✗ " in markdown(document(checked, found, "out/run", None))
+    page = markdown(document(checked, found, "out/run", None))
+    assert "\n- Possible cause of the asymptotic errors of mine: gravity 1 % too high.\n- ✗ " in page
 
 
 def test_moments_that_no_body_has_explain_no_error():

@@ -147,9 +147,12 @@ def log_fit(
     transfers: list[Transfer] = []
     for parameter in FIRST_GRID:
         of_each = {label: _estimate(label, parameter, profiles, size) for label, profiles in fitted.items()}
+        identified = {label: fitted[label] for label, one in of_each.items() if one.has_lower or one.has_upper}
         bounded = {label: fitted[label] for label, one in of_each.items() if one.has_lower and one.has_upper}
         estimates += of_each.values()
-        transfers += [_transfer(parameter, *pair, bounded, size) for pair in combinations(bounded, 2)]
+        transfers += [
+            _transfer(parameter, *pair, identified, size, are_bounded=bounded.keys() >= {*pair}) for pair in combinations(identified, 2)
+        ]
         if parameter == "friction" and len(bounded) > 1:
             friction = _of_all(parameter, bounded, size)
     discrepancies = {label: finer.discrepancy for label, (_, finer) in fitted.items()}
@@ -187,14 +190,17 @@ def _estimate(label: str, parameter: str, profiles: Steps, size: int) -> Estimat
     return Estimate(label, parameter, float(finer.value[column]), lower, upper, has_lower, has_upper)
 
 
-def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Steps], size: int) -> Transfer:
-    """The difference of a parameter between two engines, resample by resample, at both ends of the values that are as good as the best."""
+def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Steps], size: int, *, are_bounded: bool) -> Transfer:
+    """The difference of a parameter between two engines, resample by resample, at both ends of the values that are as good as the best.
+
+    Estimates that are bounded on one side alone may be shown to differ, but not to be equal.
+    """
     column, (coarse, one), (other_coarse, other) = list(FIRST_GRID).index(parameter), fitted[first], fitted[second]
     ends = np.stack([one.lower - other.lower, one.upper - other.upper])[..., column]
     lower, upper = expanded(ends.min(axis=0), ends.max(axis=0), size)
     by_step = abs(float((one.value - coarse.value - other.value + other_coarse.value)[column]))
     lower, upper = lower - by_step, upper + by_step
-    differs, is_equal = lower > 0.0 or upper < 0.0, max(-lower, upper) <= EQUAL
+    differs, is_equal = lower > 0.0 or upper < 0.0, are_bounded and max(-lower, upper) <= EQUAL
     verdict = "equal" if is_equal else "different" if differs else "undecided"
     return Transfer(parameter, first, second, float(one.value[column] - other.value[column]), lower, upper, verdict)
 

@@ -3,6 +3,7 @@
 An engine makes the tosses, with .2 mm and 2 mrad of white noise at 148 Hz; it and another engine are fitted to them.
 """
 
+import math
 import sys
 from concurrent.futures import ProcessPoolExecutor
 
@@ -26,15 +27,16 @@ def outcome(count, number):
         fit = log_fit(tosses(random, count, WANG, **truth, dt=FINE), [WANG, OTHER], jobs=1)
     of_each = {(one.parameter, one.engine): one for one in fit.estimates}
     asked = [of_each["friction", WANG], of_each["restitution", WANG], of_each["friction", OTHER], fit.friction]
-    [verdict] = [one.verdict for one in fit.transfers if one.parameter == "restitution"]
-    return [*(one.lower <= truth[one.parameter] <= one.upper for one in asked), verdict == "different", verdict == "undecided"]
+    verdicts = [one.verdict for one in fit.transfers if one.parameter == "restitution"]
+    held = [math.nan if one is None else float(one.lower <= truth[one.parameter] <= one.upper) for one in asked]
+    return [*held, float("different" in verdicts), float("undecided" in verdicts)]
 
 
 def main():
     rows = [HEAD, ["---"] * len(HEAD)]
     with ProcessPoolExecutor() as pool:
         for count in COUNTS:
-            shares = np.mean(list(pool.map(outcome, [count] * RECORDINGS, range(RECORDINGS))), axis=0)
+            shares = np.nanmean(list(pool.map(outcome, [count] * RECORDINGS, range(RECORDINGS))), axis=0)
             rows.append([str(count), *(f"{100.0 * share:.1f} %" for share in shares)])
     sys.stdout.writelines(f"| {' | '.join(cells)} |\n" for cells in rows)
 

@@ -79,7 +79,7 @@ def test_verdict_on_a_parameter_of_two_engines(spread, verdict):
     """Resamples of the first engine differ from 0.5, all those of the second, by a mean and a standard deviation."""
     of_first = 0.5 + spread[0] + spread[1] * np.random.default_rng(9).normal(size=(1999, 2))
     profiles = {"first": profile(of_first, 0.5 + spread[0]), "second": profile(np.full((1999, 2), 0.5), 0.5)}
-    found = log_fits._transfer("restitution", "first", "second", profiles, 50)
+    found = log_fits._transfer("restitution", "first", "second", profiles, 50, are_bounded=True)
     assert (found.verdict, found.difference) == (verdict, pytest.approx(spread[0]))
 
 

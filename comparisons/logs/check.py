@@ -112,11 +112,8 @@ def log_check(recording: Flights | Log | str | Path) -> Check:
     Raises:
         DropspinError: The recording cannot be loaded, or no toss has a free flight.
     """
-    flights = (
-        recording
-        if isinstance(recording, Flights)
-        else flights_in_any_units(recording if isinstance(recording, Log) else load_log(recording))
-    )
+    log = load_log(recording) if isinstance(recording, str | Path) else recording
+    flights = flights_in_any_units(log) if isinstance(log, Log) else log
     drag = regression([positions(flight, with_drag=True) for flight in flights.found])
     found = [*_of_units(flights), *of_quaternions(flights.log, flights), *of_rates(flights), *of_frames(flights)]
     values = tuple(_values(flights, drag))
@@ -161,10 +158,10 @@ def _rate_cause(log: Log, ratio: float) -> Cause:
 
 
 def _falls(flights: Flights, drag: Regression, outside: float = 0.05) -> tuple[float, float]:
-    """The interval of gravity that an interval is outside of with a probability: without drag, and with it too if there is any [m/s²]."""
+    """The interval that misses gravity with the probability `outside` [m/s²]: that without drag, and that with it too if there is any."""
     found = [flights.moving, *([drag] if drag.values[-1] > drag.half_widths()[-1] else [])]
     middles, widths = [-one.values[1] for one in found], [one.half_widths(outside)[1] for one in found]
-    return min(np.subtract(middles, widths)), max(np.add(middles, widths))
+    return float(np.min(np.subtract(middles, widths))), float(np.max(np.add(middles, widths)))
 
 
 def _of_scale(flights: Flights, drag: Regression) -> Iterator[Finding]:

@@ -109,9 +109,10 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     rounded = rounding(scene, metric.unit, claim.precision, np.array([point.steps for point in series], dtype=float))
     judged = []
     for errors, resolutions in _worst_parts(scene, metric, series):
-        spread = np.nanmax(errors, initial=-math.inf) - np.nanmin(errors, initial=math.inf)
-        # A step changes a jumping metric by chance, as far as it has changed it at all.
-        noise = STANDARD_DEVIATIONS * (np.maximum(resolutions, spread) if metric.name in JUMPING else resolutions)
+        chance = 0.0
+        if metric.name in JUMPING:  # the step changes it by chance, as far as it has changed it at all
+            chance = float(np.nanmax(errors, initial=-math.inf) - np.nanmin(errors, initial=math.inf))
+        noise = STANDARD_DEVIATIONS * np.maximum(resolutions, chance)
         judged.append((error_budget(dts, errors, claim.order, noise, rounded, signed=metric.signed, negligible=floor), errors))
     length, errors = _worse(judged, floor)
     vector = _budget_of_components(scene, claim, metric, series, np.isfinite(errors), rounded)

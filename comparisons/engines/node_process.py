@@ -8,6 +8,7 @@ import atexit
 import json
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 from signal import Signals
 from subprocess import DEVNULL, PIPE, Popen
@@ -66,8 +67,9 @@ class Node:
         assert requests is not None
         assert answers is not None
         try:
-            requests.write(json.dumps({"todo": todo, **given}).encode() + b"\n")
-            requests.flush()
+            with suppress(BrokenPipeError):  # of a process that has ended: it gives no answer
+                requests.write(json.dumps({"todo": todo, **given}).encode() + b"\n")
+                requests.flush()
             answer = json.loads(answers.readline() or b"{}")
             packed = answers.read(answer.get("bytes", 0))
             if "error" in answer:

@@ -91,6 +91,15 @@ def test_a_crash_is_named_and_the_next_simulation_has_another_process(steps):
     assert moved() == expected
 
 
+def test_a_process_that_ended_between_two_requests_is_named():
+    with prepared() as simulation:
+        process = this_node()._process
+        process.kill()
+        process.wait()
+        with pytest.raises(RuntimeError, match=r"^Node\.js ended with SIGKILL$"):
+            simulation.advance(1)
+
+
 def test_an_error_of_the_driver_is_named():
     with pytest.raises(RuntimeError, match=r"^TypeError: "):
         this_node().ask("record", world=-1, steps=1, every=1)

@@ -6,19 +6,15 @@ from itertools import product
 import numpy as np
 
 from dropspin.comparisons.logs.flight import ACCELERATION, accelerations, is_near, noise_of, standard_error, window_size
-from dropspin.comparisons.logs.flights import Flights, flights_of
+from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, flights_of, heights
 from dropspin.comparisons.logs.log import LENGTHS, TIMES, Log
-from dropspin.scenarios.ensemble import clearances
 from dropspin.scenarios.errors import DropspinError
-from dropspin.scenarios.rotations import rotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, Array
+from dropspin.scenarios.state import Array
 
 ALARM = 1e-4
 """Probability of a finding where there is nothing, of each value."""
 RATES = (0.5, 2.0)
 """Rates over the true one that are tried."""
-ON_FLOOR = 0.1
-"""Share of the size of the body: height of its lowest point up to which it is on the floor."""
 
 
 def flights_in_any_units(log: Log) -> Flights:
@@ -41,12 +37,11 @@ def flights_in_any_units(log: Log) -> Flights:
 
 def _flies(flights: Flights) -> bool:
     """Whether an acceleration that is not the header's is one, and the body does not stay on the floor all the while."""
-    moving, body = flights.moving, flights.log.header.body
+    moving, header = flights.moving, flights.log.header
     if np.linalg.norm(moving.values[ACCELERATION]) <= np.linalg.norm(moving.half_widths(ALARM)[ACCELERATION]):
         return False
-    poses = np.concatenate([np.hstack([flight.toss.position, flight.toss.orientation])[flight.rows] for flight in flights.found])
-    poses[:, POSITION] -= rotate(poses[:, ORIENTATION], flights.log.header.tracked_from_centre)
-    return bool(np.abs(clearances(poses, body.vertices, body.semi_axes)).max() > ON_FLOOR * body.size)
+    each = [heights(header, flight.toss.position[flight.rows], flight.toss.orientation[flight.rows]) for flight in flights.found]
+    return bool(np.abs(np.concatenate(each)).max() > NEAR_FLOOR * header.body.size)
 
 
 def _acceleration(log: Log, down: Array) -> Array:

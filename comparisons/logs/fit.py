@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.logs.flights import Flights
+from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, heights
 from dropspin.comparisons.logs.grids import FIRST_GRID, Problem, Profile, problem_of, profile_of
 from dropspin.comparisons.logs.intervals import LEVEL, expanded
 from dropspin.comparisons.logs.log import Log
@@ -19,15 +19,13 @@ from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import FIVE_MINUTES, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
-from dropspin.scenarios.ensemble import clearances
-from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION
 
 ANY_ENGINE = "any engine"
 ENGINES = ("mujoco", "wang[contact=sequential,law=coulomb]")
 FRAMES = 8
 """Frames after the last one of the flight."""
-STEPS_PER_FRAME = 32, 64
+FINE_STEPS = 32, 64
 """Time steps of the engines in a frame: an impact is up to a step late, so that restitution is fitted too large by a part that falls with
 the step. What is left of it at the finer step is about the difference between the two.
 """
@@ -35,10 +33,6 @@ Steps = tuple[Profile, Profile]
 """The estimates of an engine at the coarser and at the finer time step."""
 EQUAL = 0.02
 """Difference of a parameter between engines that may be neglected: in a restitution of 0.4, it changes a rebound's height by a tenth."""
-
-
-NEAR_FLOOR = 0.1
-"""Height of the lowest point, over the size of the body, below which a frame may be one of a contact, which may be between two frames."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +134,7 @@ def log_fit(
         DropspinError: The recording has no floor, or too few tosses with frames after a flight.
     """
     entries, flights = engine_entries(engines, ENGINES), flights_in(recording)
-    problems = [problem_of(flights, frames, steps) for steps in STEPS_PER_FRAME]
+    problems = [problem_of(flights, frames, steps) for steps in FINE_STEPS]
     fitted, left_out = of_each_engine(entries, partial(_profiles, problems), on_progress, resources, jobs)
     size, friction = len(problems[0].measured), None
     estimates: list[Estimate] = []
@@ -175,9 +169,8 @@ def _profiles(
 
 def _touches(problem: Problem) -> bool:
     """Whether a body is near the floor of the header in any of the frames."""
-    body, poses = problem.header.body, problem.measured.reshape(-1, 7).copy()
-    poses[:, POSITION] -= rotate(poses[:, ORIENTATION], problem.header.tracked_from_centre)
-    return bool(clearances(poses, body.vertices, body.semi_axes).min() < NEAR_FLOOR * body.size)
+    poses = problem.measured.reshape(-1, 7)
+    return bool(heights(problem.header, poses[:, POSITION], poses[:, ORIENTATION]).min() < NEAR_FLOOR * problem.header.body.size)
 
 
 def _estimate(label: str, parameter: str, profiles: Steps, size: int) -> Estimate:

@@ -16,6 +16,8 @@ from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Arra
 
 HIGH = 0.01
 """Of the size of the body: how far it gets above the floor in a flight, at least."""
+NEAR_FLOOR = 0.1
+"""Height of the lowest point, over the size of the body, below which a frame may be one of a contact, which may be between two frames."""
 HIDDEN = 0.1
 """Component, along an axis, of a direction that flights do not show, from which on they do not show that axis."""
 
@@ -142,6 +144,10 @@ def _above_floor(header: Header, flights: list[Flight | None]) -> list[Flight | 
 def _height(header: Header, flight: Flight) -> float:
     """The largest height of the body's lowest point [m]."""
     frames = slice(flight.first, flight.end)
-    position, orientation = flight.toss.position[frames], flight.toss.orientation[frames]
-    states = np.hstack([position - rotate(orientation, header.tracked_from_centre), orientation])
-    return float(clearances(states, header.body.vertices, header.body.semi_axes).max())
+    return float(heights(header, flight.toss.position[frames], flight.toss.orientation[frames]).max())
+
+
+def heights(header: Header, position: Array, orientation: Array) -> Array:
+    """Heights of the body's lowest point above the floor [m], shape (n,), from poses of the tracked point, shapes (n, 3) and (n, 4)."""
+    poses = np.hstack([position - rotate(orientation, header.tracked_from_centre), orientation])
+    return clearances(poses, header.body.vertices, header.body.semi_axes)

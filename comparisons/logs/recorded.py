@@ -94,7 +94,8 @@ def _restlessness(left: list[Array]) -> float:
 def of_rates(flights: Flights) -> Iterator[Finding]:
     """Of recorded velocities and spins that are not those of the positions and quaternions: in another frame or unit, or reversed."""
     each, in_world = zip(flights.found, flights.rotations, strict=True), flights.log.header.spin_frame == "world"
-    spun = [(flight, flight.toss.angular_velocity, rotor(flight.t)[1]) for flight, rotor in each]
+    rated = [pair for pair in each if pair[0].toss.angular_velocity is not None or pair[0].toss.velocity is not None]
+    spun = [(flight, flight.toss.angular_velocity, rotor(flight.t)[1]) for flight, rotor in rated]
     frame = Cause("spin frame", keys={"spin_frame": "body" if in_world else "world"})
     degrees = Cause("degrees", 180.0 / math.pi - 1.0)
     yield from _of_column("spin", spun, flights.turning.noise.white, (frame, Cause("sign of the spin")), degrees)
@@ -139,12 +140,10 @@ def _of_column(
 
     if float(np.median(length(given - exact))) <= max(MOST_NOISE * noise, ALLOWED * size):
         return
-    factor = float(np.sum(given * exact) / np.sum(exact**2))
-    unit = unit or Cause("unit of the velocity", factor - 1.0)
-    in_unit = (unit, given / (1.0 + unit.share)) if factor > 0.0 else (unit, given)
-    frame, reversed_ = causes
-    other = [rotate(turned, given), unrotate(turned, given)]
-    readings = [*((frame, values) for values in other), (reversed_, -given), in_unit]
+    factor = 1.0 + unit.share if unit else float(np.sum(given * exact) / np.sum(exact**2))
+    unit, (frame, reversed_) = unit or Cause("unit of the velocity", factor - 1.0), causes
+    readings = [(frame, rotate(turned, given)), (frame, unrotate(turned, given)), (reversed_, -given)]
+    readings.append((unit, given / factor if factor > 0.0 else given))
     cause, best = min(readings, key=lambda reading: error(reading[1]))
     yield Finding(kind, error(given), 0.0, causes=(cause,) if error(best) < EXPLAINED_RATES * error(given) else ())
 
@@ -174,38 +173,25 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
             yield Finding("no flight", 0.0, window_size(toss, noise, flights.moving.values[ACCELERATION]), toss.name)
     for flight, weight in zip(flights.found, flights.moving.weights, strict=True):
         own = flights.moving.noise.of_weight(min(weight, 1.0))
-        backwards = flight.backwards()
-        after, before = (_dropped(part, flights.moving.values, own) for part in (flight, backwards))
-        bad_after, bad_before = (_bad_frames(part, flights.moving.values, own) for part in (flight, backwards))
-        if before:
-            yield Finding("frame dropped", before, 0.0, flight.toss.name, flight.first - 1)
-        elif bad_before:
-            yield Finding("bad frame", bad_before, 0.0, flight.toss.name, flight.first - 1 - bad_before)
-        elif flight.first > 2:
-            yield Finding("late", flight.first, 0.0, flight.toss.name, flight.first, (Cause("held"), Cause("earlier impact")))
-        if after:
-            yield Finding("frame dropped", after, 0.0, flight.toss.name, flight.end + 1)
-        elif bad_after:
-            yield Finding("bad frame", bad_after, 0.0, flight.toss.name, flight.end + 1)
+        for part in (flight.backwards(), flight):
+            missing = _interrupted(part, flights.moving.values, own, by_bad_frames=False)
+            bad = 0 if missing else _interrupted(part, flights.moving.values, own, by_bad_frames=True)
+            if missing or bad:
+                frame = flight.end + 1 if part is flight else flight.first - 1 - bad
+                yield Finding("frame dropped" if missing else "bad frame", missing or bad, 0.0, flight.toss.name, frame)
+            elif part is not flight and flight.first > 2:
+                yield Finding("late", flight.first, 0.0, flight.toss.name, flight.first, (Cause("held"), Cause("earlier impact")))
 
 
-def _dropped(flight: Flight, shared: Array, noise: Noise) -> int:
-    """How many frames are missing at the end of a flight: the number by which the next frames are of it if they are later; 0 if none."""
+def _interrupted(flight: Flight, shared: Array, noise: Noise, *, by_bad_frames: bool) -> int:
+    """How many frames are missing at the end of a flight, or are not of it: the number with which the next ones are of it; 0 if none."""
     dt = float(np.median(np.diff(flight.toss.t)))
-    # The last frame of a flight was left out before an impact; the frame after it is the first one that is not of the flight.
-    frames = range(flight.end + 1, min(flight.end + 4, len(flight.toss)))
-    for missing in (1, 2, 3):
-        if len(frames) == 3 and all(surprise(flight, frame, shared, noise, missing * dt) < SURPRISING for frame in frames):
-            return missing
-    return 0
-
-
-def _bad_frames(flight: Flight, shared: Array, noise: Noise) -> int:
-    """How many frames at the end of a flight are not of it, although the ones after them are; 0 if none."""
-    for bad in (1, 2, 3):
-        frames = range(flight.end + 1 + bad, min(flight.end + 4 + bad, len(flight.toss)))
-        if len(frames) == 3 and all(surprise(flight, frame, shared, noise) < SURPRISING for frame in frames):
-            return bad
+    for number in (1, 2, 3):
+        # The last frame of a flight was left out before an impact; the frame after it is the first one that is not of the flight.
+        first, delay = (flight.end + 1 + number, 0.0) if by_bad_frames else (flight.end + 1, number * dt)
+        frames = range(first, min(first + 3, len(flight.toss)))
+        if len(frames) == 3 and all(surprise(flight, frame, shared, noise, delay) < SURPRISING for frame in frames):
+            return number
     return 0
 
 

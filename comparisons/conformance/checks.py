@@ -15,6 +15,7 @@ from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios.errors import verify_known
+from dropspin.scenarios.state import Array
 
 CHECKS: dict[str, Callable[[Engine], str]] = {
     "compilation": timing.check_compilation,
@@ -36,6 +37,11 @@ CHECKS: dict[str, Callable[[Engine], str]] = {
     **{probe.name: partial(check_motion, probe=probe) for probe in PROBES},
 }
 """By name; each returns what it found, and raises one of `OUTCOMES` otherwise."""
+
+LEFT = ("failed", "crashed")
+"""Outcomes that state left by other checks may cause."""
+AFTER_SIMILAR = "a scene gives other bits after one that differs from it in one quantity than alone: a simulation leaves state behind"
+AFTER_OTHERS = "this check fails after other checks, but not alone: a simulation leaves state behind"
 
 
 def conform(
@@ -62,15 +68,38 @@ def conform(
         EngineBroken: The engine cannot be imported or constructed.
     """
     verify_known("check", checks, CHECKS)
-    entry, results = present_entry(engine), []
+    entry, results = present_entry(engine), list[CheckResult]()
     with tempfile.TemporaryDirectory() as folder, EngineProcesses(resources) as processes:
         for check in checks or CHECKS:
-            result = processes.call(entry, run_check, check, folder)
-            if isinstance(result, Breakdown):
-                result = CheckResult(check, cast(CheckOutcome, result.verdict), result.reason)
+            result = _result(processes, entry, check, folder)
+            if result.outcome in LEFT and results:
+                processes.renew(entry)
+                alone = _result(processes, entry, check, folder)
+                result = alone if alone.outcome in LEFT else CheckResult(check, "failed", f"{AFTER_OTHERS} ({result.message})")
+            if check == "repeats" and result.outcome == "passed" and _depends_on_earlier(processes, entry):
+                result = CheckResult(check, "failed", AFTER_SIMILAR)
             results.append(result)
             (on_result or ignore)(result)
     return results
+
+
+def _result(processes: EngineProcesses, entry: EngineEntry, check: str, folder: str) -> CheckResult:
+    result = processes.call(entry, run_check, check, folder)
+    return CheckResult(check, cast(CheckOutcome, result.verdict), result.reason) if isinstance(result, Breakdown) else result
+
+
+def _depends_on_earlier(processes: EngineProcesses, entry: EngineEntry) -> bool:
+    """Whether a scene gives other bits after one that differs from it in one quantity than as the first in a process."""
+
+    def states(*which: int) -> list[Array] | Breakdown:
+        processes.renew(entry)
+        return processes.call(entry, protocol.states_of_variants, which)
+
+    after = states()
+    if isinstance(after, Breakdown):
+        return False
+    alone = [states(number) for number in range(len(after))]
+    return any(isinstance(first, Breakdown) or not protocol.same(first[0], other) for first, other in zip(alone, after, strict=True))
 
 
 def run_check(entry: EngineEntry, check: str, folder: str | None = None) -> CheckResult:

@@ -6,6 +6,7 @@ Simulations are also independent: of what ran before, of each other, and of the 
 
 import os
 import tempfile
+from collections.abc import Sequence
 from contextlib import chdir
 
 import numpy as np
@@ -14,6 +15,7 @@ from dropspin.comparisons.conformance.motions import explain_start
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted, described
 from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, FLIGHTS, PROBES, accepted_scene, recorded, state_after
 from dropspin.comparisons.engines.base import Diverged, Engine
+from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.verification import (
     MULTIPLE,
     BuildMismatch,
@@ -25,10 +27,14 @@ from dropspin.comparisons.running.verification import (
     verify_start,
 )
 from dropspin.scenarios import Scenario, load, names
+from dropspin.scenarios.bodies.shape import times
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.text import counted
+from dropspin.scenarios.variations import with_size, with_values
 
 SEVERAL = 3
+OTHER = 0.8
+"""Factor on a quantity of another scene."""
 ROUNDING = 1e-9
 """Relative to the largest number: by how much `record` and `advance` may differ, which is noted."""
 ASYMMETRIC = next(probe.scene for probe in PROBES if probe.name == "tumbling")
@@ -180,22 +186,39 @@ def check_repeats(engine: Engine) -> str:
     a, b = accepted_scene(engine), accepted_scene(engine, "turning", "coasting")
     halves = [A_FEW_STEPS // 2, A_FEW_STEPS - A_FEW_STEPS // 2]
     first, stepped = recorded(engine, a), state_after(engine, a, halves)
-    if not all(_same(first, recorded(engine, a)) and _same(stepped, state_after(engine, a, halves)) for _ in range(SEVERAL)):
+    if not all(same(first, recorded(engine, a)) and same(stepped, state_after(engine, a, halves)) for _ in range(SEVERAL)):
         raise CheckFailed(
             "the same scene gives different bits when it runs again: the engine is random, or keeps state between simulations"
         )
     with engine.prepare(b, 4 * DT) as other:
         other.advance(A_FEW_STEPS)
-        if not _same(first, recorded(engine, a)):
+        if not same(first, recorded(engine, a)):
             raise CheckFailed("the same scene gives different bits while another simulation is open: simulations share state")
-        if not _same(stepped, state_after(engine, a, halves, lambda: other.advance(A_FEW_STEPS))):
+        if not same(stepped, state_after(engine, a, halves, lambda: other.advance(A_FEW_STEPS))):
             raise CheckFailed("two simulations that take turns affect each other: simulations share state")
-    if not _same(first, recorded(engine, a)):
+    if not same(first, recorded(engine, a)):
         raise CheckFailed("the same scene gives different bits after another scene (A, B, A): a simulation leaves state behind")
     return "a scene gives the same bits when it runs again, after another scene, and in turn with a second simulation"
 
 
-def _same(first: Array, second: Array) -> bool:
+def states_of_variants(entry: EngineEntry, which: Sequence[int] = ()) -> list[Array]:
+    """The states of a scene and of those that differ from it in one quantity, simulated in this order; by default of all."""
+    engine = entry.adapter
+    scene = accepted_scene(engine)
+    variants = [
+        scene,
+        with_size(scene, OTHER * scene.body.size),
+        with_values(scene, "body", mass=lambda mass: OTHER * mass),
+        with_values(scene, "floor", restitution=lambda restitution: OTHER * restitution),
+        with_values(scene, "gravity", acceleration=lambda acceleration: times(OTHER, acceleration)),
+        scene.starting_at(scene.initial_state * np.repeat([1.0, OTHER], [7, 6])),
+    ]
+    accepted = [variant for variant in variants if engine.refusal(variant) is None]
+    return [recorded(engine, accepted[number]) for number in which or range(len(accepted))]
+
+
+def same(first: Array, second: Array) -> bool:
+    """Whether states are equal bit for bit."""
     return np.array_equal(first, second, equal_nan=True)
 
 

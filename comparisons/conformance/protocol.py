@@ -87,6 +87,8 @@ def check_builds(engine: Engine) -> str:
 
 def _verify_built(engine: Engine, scene: Scenario) -> bool:
     """Verify what an engine built of a scene; whether it reads back mass, inertia and gravity."""
+    arrays = {name: getattr(scene.body, name) for name in ("inertia_tensor", "vertices", "centre")}
+    before = {name: values.copy() for name, values in arrays.items()}
     with engine.prepare(scene, DT) as simulation:
         state = simulation.state()
         if not (isinstance(state, np.ndarray) and state.shape == (13,) and state.dtype.kind in "fiu"):
@@ -100,7 +102,11 @@ def _verify_built(engine: Engine, scene: Scenario) -> bool:
             raise CheckFailed(_start_explained(engine, scene, state) or str(error)) from None
         verify_build(engine, scene, simulation, DT)
         verified_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
-        return simulation.as_built() is not None
+        has_built = simulation.as_built() is not None
+    written = [name for name, values in arrays.items() if not np.array_equal(values, before[name])]
+    if written:
+        raise CheckFailed(f"the adapter writes into scene.body.{written[0]}, which everything else uses too; change a copy of it")
+    return has_built
 
 
 def _start_explained(engine: Engine, scene: Scenario, state: Array) -> str:

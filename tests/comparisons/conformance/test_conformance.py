@@ -394,6 +394,17 @@ def test_friction_fault_exceeds_the_known_limitation(factor, monkeypatch):
     assert found.loc["position_error", "verdict"] == "failed"
 
 
+@pytest.mark.usefixtures("engine_processes")
+def test_adapter_that_writes_into_an_array_of_the_scene_is_named():
+    class Writing(made.Exact):
+        def prepare(self, scene, dt):
+            scene.body.inertia_tensor[0, 0] *= 1.0 + 1e-9
+            return super().prepare(scene, dt)
+
+    [found] = conform(Writing(), ["builds what is meant"])
+    assert found.message.startswith("the adapter writes into scene.body.inertia_tensor, ")
+
+
 class Caching(made.Exact):
     """Keeps the floor of the first scene for all others, as a cache with too few keys does."""
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
-from dropspin.comparisons.conformance.probes import DT, accepted_scene
+from dropspin.comparisons.conformance.probes import DT, accepted_scene, recorded
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.faults.mistakes import NOT_INVERTED, NOT_ROTATED, ROTATED_BACK, SQUARE
 from dropspin.comparisons.measuring.comparison import Comparison
@@ -53,6 +53,8 @@ PECULIARITIES = (BY_SLIP, OF_NOTE)
 LATER = "restitution decays from one contact to the next"
 FILE, NEAR = Path(__file__).with_name("impacts.toml"), 0.02  # m, above the floor
 FALL, SAME = 0.02, 0.25  # the least fall of a restitution, relative to it, and a difference that is none, relative to the fall
+BESIDE = 1e-3
+"""Distance of an impulse from the centre of a ball, over its radius, from which it is stated."""
 CHANGED, SLOWEST, FEWEST, LASTING = 0.05, 0.1, 2, 1.0  # of a restitution; m/s; impacts; s
 
 Inverse = Callable[[Array, Array], NDArray[Any]]
@@ -192,12 +194,25 @@ def _impulses(contact: Contact, response: Array) -> Iterator[tuple[str, Array]]:
             yield IN_FRICTION, by_force(rebound, factor)
 
 
+def turning_impulse(scene: Scenario, states: Array) -> str:
+    """A message if a floor without friction turns a ball; `states`, shape (2, 13), are those before and after; empty if it does not."""
+    change = states[1] - states[0]
+    if scene.floor is None or scene.floor.friction != "none" or not scene.body.is_ball or change[VELOCITY][1] <= 0.0:
+        return ""
+    arm = float(np.linalg.norm(scene.body.inertia_tensor @ change[SPIN]) / (scene.body.mass * change[VELOCITY][1]))
+    if arm <= BESIDE * scene.body.size:
+        return ""
+    return f"a floor without friction turns a ball: the impulse acts {arm:.2g} m beside the centre of mass, which is the centre of the ball"
+
+
 def check_later_impacts(engine: Engine) -> str:
     """Restitution is the same at each contact of a body that bounces."""
     decay = decaying_restitution(engine)
     if decay is not None:
         raise CheckFailed(decay)
-    pairs = restitutions(engine)
+    pairs, scene = restitutions(engine), accepted_scene(engine, "bouncing ball", "bouncing box")
+    if turning := turning_impulse(scene, recorded(engine, scene)[[0, -1]]):
+        raise CheckFailed(turning)
     if len(pairs) >= FEWEST and abs(pairs[1][0] - pairs[0][0]) > CHANGED * pairs[0][0]:
         raise Noted(f"restitution depends on the speed: {', '.join(f'{e:.3g} at {speed:.3g} m/s' for e, speed in pairs)}")
     return f"restitution in successive impacts: {', '.join(f'{e:.3g}' for e, _ in pairs)}"

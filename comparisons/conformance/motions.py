@@ -13,7 +13,14 @@ from itertools import combinations
 
 import numpy as np
 
-from dropspin.comparisons.conformance.impacts import OF_NOTE, OF_REBOUND, PECULIARITIES, decaying_restitution, explain_impact
+from dropspin.comparisons.conformance.impacts import (
+    OF_NOTE,
+    OF_REBOUND,
+    PECULIARITIES,
+    decaying_restitution,
+    explain_impact,
+    turning_impulse,
+)
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
 from dropspin.comparisons.conformance.probes import DT, PROBES, Probe, differences
 from dropspin.comparisons.engines.base import Engine, KnownLimitation
@@ -241,6 +248,9 @@ def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
         after = min(max(after, int(np.searchsorted(times, case.impacts[0] + step))), int(np.searchsorted(times, end - step)))
     duration = (after - before) * case.dt
     change, exact = (rows.velocity[after] - rows.velocity[before] - duration * scene.acceleration for rows in (case.motion, case.exact))
+    if turning := turning_impulse(scene, case.motion.states[[before, after]]):
+        yield turning
+        return
     if case.impacts and abs(change[1] - exact[1]) > allowed:
         sampled = Comparison(scene, case.exact, case.exact, case.impacts)
         wrong, right = (METRICS["restitution_error"].value_or_nan([compared]) for compared in (case, sampled))

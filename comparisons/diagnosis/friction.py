@@ -39,7 +39,7 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         return [replace(blank, direction=way, detail=TIPS) for way in ("0°", "45°")]
     ways = (("0°", along), ("45°", across))
     answers = [judged(body, replace(blank, direction=way), dts, stops, [exact] * len(dts), OF_FALLS) for way, stops in ways]
-    if not facts.isotropic:
+    if not math.isnan(facts.friction_across):
         return [answers[0], replace(blank, direction="45°", physical=math.nan, measured=across[0])]
     if SLIDE / (facts.friction * facts.gravity) < LONG_SLIDE:
         answers = [_of_short_slide(one) for one in answers]

@@ -66,7 +66,7 @@ class Facts:
         surface: The name of what it lands on; empty for nothing.
         others: The names of what else it may land on.
         friction: The coefficient of friction of both together, along x.
-        isotropic: Whether it is the same in all directions.
+        friction_across: That along z; NaN if it is the same.
         restitution: The coefficient of restitution of both together; None if the engine has none.
         margin: Height above the surface from which the contact acts [m].
         rolling: Whether friction resists rolling.
@@ -97,7 +97,7 @@ class Facts:
     surface: str
     others: Sequence[str] = ()
     friction: float
-    isotropic: bool = True
+    friction_across: float = math.nan
     restitution: float | None = None
     margin: float
     rolling: bool

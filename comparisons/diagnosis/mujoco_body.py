@@ -1,5 +1,6 @@
 """A free body of a file that MuJoCo compiles, simulated alone, with the values that the compiled model has."""
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
@@ -140,6 +141,7 @@ class MuJoCoBody(LooseBody):
         inside = 0.0 if surface is None or self._names[surface] == ADDED else self._start_inside(pose)
         start = [f"a start {inside:.3g} m inside the surface"] * (inside > DEEP * self._model.stat.extent)
         tilted = [f"a gravity {off:.3g}° from the inward normal of the surface"] * (off > LEVEL)
+        frictions = [0.0, 0.0] if touching is None or touching["condim"] == 1 else touching["friction"][[1, 0]].tolist()
         return Facts(
             name=self._name,
             engine="MuJoCo",
@@ -159,8 +161,8 @@ class MuJoCoBody(LooseBody):
             unknown=[name for name, acts in unmodelled.items() if acts],
             surface="" if surface is None else self._names[surface],
             others=[self._names[geom] for geom in alone.others],
-            friction=0.0 if touching is None or touching["condim"] == 1 else float(touching["friction"][1]),
-            isotropic=touching is None or touching["friction"][0] == touching["friction"][1],
+            friction=frictions[0],
+            friction_across=math.nan if frictions[0] == frictions[1] else frictions[1],
             margin=0.0 if touching is None else float(touching["margin"] - lowers_margin() * touching["gap"]),
             rolling=touching is not None and touching["condim"] == 6 and bool(np.any(touching["friction"][3:])),
             rest_depth=self._rest_depth(pose),

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import Changes, MassProperties
-from dropspin.comparisons.diagnosis.source import read_source
+from dropspin.comparisons.diagnosis.source import option_setting, read_source
 from dropspin.comparisons.engines.mujoco_simulation import quiet
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
@@ -34,6 +34,8 @@ TURNED = 1e-6
 """Difference of |cos(angle / 2)| from 1 up to which two orientations are the same."""
 LEAST = 2e-15
 """Just above the smallest mass [kg] and moment [kg m²] that MuJoCo accepts: those of bodies of which a file says nothing."""
+LONGEST_STEP = 0.1
+"""The longest time step [s] in which the motions, of a second or less, are resolved."""
 ADDED = "a plane with default settings"
 """The surface of a file that has none."""
 
@@ -58,6 +60,9 @@ class MuJoCoFile:
                 self.model = self._compiled(path)
         except (ValueError, mujoco.FatalError) as error:
             raise DropspinError(f"{given}: MuJoCo does not compile it: {one_line(error)}.") from None
+        if not 0.0 < self.model.opt.timestep <= LONGEST_STEP:
+            written = option_setting(self.source, "option", "timestep", "")
+            raise DropspinError(f"{given}: {written}: a time step must be above 0 and at most {LONGEST_STEP:g} s.")
         _, self.data = placed(self.model)
         flags, bit = self.model.opt.disableflags, mujoco.mjtDisableBit
         self.gravity = np.zeros(3) if flags & bit.mjDSBL_GRAVITY else np.array(self.model.opt.gravity)

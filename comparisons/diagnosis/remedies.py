@@ -25,9 +25,24 @@ class Targets(NamedTuple):
     restitution: float | None = None
     friction: float | None = None
 
-    def judge(self, body: LooseBody, answer: Answer) -> Answer:
+    @property
+    def wanted(self) -> dict[str, float]:
+        """The targets by the quantities that have them."""
+        return {name: value for name, value in ((REBOUND, self.restitution), (COEFFICIENT, self.friction)) if value is not None}
+
+    def judged(self, body: LooseBody, answers: Sequence[Answer]) -> Iterator[Answer]:
+        """The answers, those that miss a target with a finding; and one for each target that nothing was measured for."""
+        yield from (self._judged(body, answer) for answer in answers)
+        facts, measured = body.facts, {answer.quantity for answer in answers} if not body.facts.missed else set()
+        why = facts.missed or ("the body lands on no surface" if not facts.surface else "gravity does not hold the body on a surface")
+        for quantity in (name for name in self.wanted if name not in measured):
+            question = "impact" if quantity == REBOUND else "friction"
+            finding = Finding("target", detail=f"the target is {self.wanted[quantity]:g}, but {why}")
+            yield Answer(question, quantity, "1", detail="not measured", findings=(finding,))
+
+    def _judged(self, body: LooseBody, answer: Answer) -> Answer:
         """An answer that misses its target as a finding, with settings for the restitution if they come closer."""
-        wanted = {REBOUND: self.restitution, COEFFICIENT: self.friction}.get(answer.quantity)
+        wanted = self.wanted.get(answer.quantity)
         if wanted is None or abs(answer.measured - wanted) <= NOTEWORTHY:
             return answer
         remedies: list[Remedy] = []

@@ -37,7 +37,7 @@ MESH = """<mujoco><asset><mesh name="mesh" file="{path}" inertia="{inertia}"/></
 <body name="{name}"><freejoint/><geom type="mesh" mesh="mesh" density="{density:g}"/></body></worldbody></mujoco>"""
 """A model with a body whose only geometry is a mesh."""
 Found = TypeVar("Found")
-OF_FACTS = ("name", "engine", "version", "dt", "mass", "surface", "friction")
+OF_FACTS = ("name", "engine", "version", "dt", "mass", "surface", "friction", "friction_across")
 """What a diagnosis has as an engine has it in force."""
 QUESTIONS: tuple[Question, ...] = (fall, spin, tumble, worst_tumble, impact, rest, slide, creep, roll)
 
@@ -55,10 +55,12 @@ class BodyDiagnosis(NamedTuple):
         surface: The name of the surface on which the body lands; empty if there is none.
         others: Other surfaces on which the body may land; empty if the surface was given.
         friction: The coefficient of friction between the body and the surface.
+        friction_across: That in the perpendicular direction; NaN if it is the same.
         answers: The measured values with their exact values and findings.
         settings: By name of a setting, its text in the model file, with file and line.
         unmodelled: Parts of the file, besides the body, that the simulations leave out.
         breakdown: The reason why there are no answers; empty if there are answers.
+        declined: Whether that is because the engine cannot read or simulate the body, not because it broke down.
     """
 
     name: str
@@ -70,10 +72,12 @@ class BodyDiagnosis(NamedTuple):
     surface: str = ""
     others: tuple[str, ...] = ()
     friction: float = math.nan
+    friction_across: float = math.nan
     answers: tuple[Answer, ...] = ()
     settings: dict[str, Setting] | None = None
     unmodelled: tuple[str, ...] = ()
     breakdown: str = ""
+    declined: bool = False
 
     @property
     def findings(self) -> list[tuple[Answer, Finding]]:
@@ -97,6 +101,12 @@ class Diagnosis:
     def failed(self) -> bool:
         """Whether a body has an impossible inertia, or misses a target."""
         return any(finding.kind in ("impossible", "target") for body in self.bodies for _, finding in body.findings)
+
+    @property
+    def broke_down(self) -> bool:
+        """Whether an engine broke down, or none has a result for a body."""
+        with_result = {body.name for body in self.bodies if not body.breakdown}
+        return any(not body.declined or body.name not in with_result for body in self.bodies if body.breakdown)
 
 
 def diagnose(
@@ -161,18 +171,22 @@ def diagnose(
         readers = [one for one in read if one not in refused] or read
         pieces = [(entry, name) for entry, names in readers for name in _checked(given, names)]
         names = dict.fromkeys(name for _, name in pieces)
-        refusals = [BodyDiagnosis(name, entry.label, breakdown=str(why)) for entry, why in refused for name in names]
+        refusals = [BodyDiagnosis(name, entry.label, breakdown=str(why), declined=True) for entry, why in refused for name in names]
         with started_crews(jobs, len(pieces), entries, resources) as crews:
 
             def of_body(piece: tuple[EngineEntry, str], processes: EngineProcesses, report: Callable[[str], None]) -> BodyDiagnosis:
                 entry, name = piece
                 report(f"{name} with {entry.label}")
                 found = processes.call(entry, _diagnosed, path, given, name, on, Targets(restitution, friction))
-                if isinstance(found, DropspinError) and refused:
-                    raise DropspinError(" ".join(str(why) for why in (*(why for _, why in refused), found)))
-                return BodyDiagnosis(name, entry.label, breakdown=found.reason) if isinstance(found, Breakdown) else _checked(given, found)
+                if isinstance(found, BodyDiagnosis):
+                    return found
+                declined = isinstance(found, DropspinError) or found.verdict == "declined"
+                return BodyDiagnosis(name, entry.label, breakdown=str(found), declined=declined)
 
-            return Diagnosis(given, (*refusals, *results_in_parallel(pieces, of_body, crews, on_progress or ignore)))
+            found = [*refusals, *results_in_parallel(pieces, of_body, crews, on_progress or ignore)]
+            if all(body.declined for body in found):
+                raise DropspinError(" ".join(dict.fromkeys(body.breakdown for body in found)))
+            return Diagnosis(given, tuple(found))
 
 
 def _checked(given: str, found: Found | DropspinError | Breakdown) -> Found:
@@ -223,13 +237,14 @@ def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | 
         return known[key]._replace(name=name)
     answers = inertia(facts) + [answer for question in QUESTIONS for answer in answers_to(question, body)]
     if facts.surface:
-        answers.append(Answer("friction", COEFFICIENT, "1", measured=facts.friction))
+        frictions = (facts.friction, facts.friction_across)
+        answers += [Answer("friction", COEFFICIENT, "1", measured=one) for one in frictions if not math.isnan(one)]
     answers += [Answer("file", key, "", findings=(Finding("changed", (key,), detail=made),)) for key, _, made in facts.ignored]
     found = BodyDiagnosis(
         **{field: getattr(facts, field) for field in OF_FACTS},
         shapes=tuple(part.shape.shape for part in facts.colliding),
         others=tuple(facts.others),
-        answers=tuple(targets.judge(body, answer) for answer in answers),
+        answers=tuple(targets.judged(body, answers)),
         settings={**facts.settings, **{key: setting for key, setting, _ in facts.ignored}},
         unmodelled=tuple(facts.unmodelled),
     )

@@ -27,7 +27,7 @@ def diagnose_command(file: str, output: str, json_output: bool, **options: Any) 
     Each free body is simulated alone, with the file's own settings, above the surface that it lands on. Its fall, spin, impact, rest,
     slide and roll are compared with exact solutions with these settings and without them. A remedy marked "tried" was simulated.
 
-    Exit code: 0 no impossible inertia and no missed target, 1 otherwise, 2 bad input.
+    Exit code: 0 no impossible inertia and no missed target, 1 otherwise, 2 bad input, 3 a body without a result.
     """
     from dropspin.comparisons.diagnosis.study import diagnose
     from dropspin.reports.stories.diagnose import Diagnosed
@@ -38,4 +38,4 @@ def diagnose_command(file: str, output: str, json_output: bool, **options: Any) 
         with share_bar(os.path.basename(file)) as on_progress:
             diagnosis = diagnose(file, **options, on_progress=on_progress)
         keep(Diagnosed(diagnosis=diagnosis))
-    return int(diagnosis.failed)
+    return 3 if diagnosis.broke_down else int(diagnosis.failed)

@@ -115,14 +115,14 @@ def left_out(reasons: Mapping[str, str]) -> list[str]:
 
 
 def explained_by(shares: Mapping[str, float], error: str) -> str:
-    """The settings that explain an error, with their shares of it; a name such as `a, b` is two settings that explain it only together."""
+    """The settings that explain an error, with their shares of it; a name such as `a, b` is two settings that explain it together."""
     names, sizes = [name.replace(", ", " and ") for name in shares], [f"{rounded(100.0 * share, 3)} %" for share in shares.values()]
     are_together = any(", " in name for name in shares)
     explain = "explain" if are_together else "explains"
     if sum(shares.values()) > SEVERAL:
         return f"either {', or '.join(names)} {explain} {sizes[0]} {error}"
     if are_together:
-        return f"{names[0]} explain {sizes[0]} {error}, but only together"
+        return f"{names[0]} together explain {sizes[0]} {error}; neither alone explains 90 %"
     others = zip(names[1:], sizes[1:], strict=True)
     return f"{names[0]} explains {sizes[0]} {error}" + "".join(f", and {name} {size}" for name, size in others)
 

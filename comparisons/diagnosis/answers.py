@@ -14,7 +14,7 @@ NOTEWORTHY = 0.01
 """Share from which a difference is a finding."""
 WATCHED = 0.3  # s
 UNTURNED = 0.05  # rad
-TIPS = "tips or rolls"
+TIPS, MOVES = "tips or rolls", "does not come to rest"
 REBOUND, COEFFICIENT = "rebound / impact speed", "coefficient of the contact"
 """The quantities that have targets."""
 DECAY_TIME, KEPT = "1/e time", "fraction kept in 1 s"

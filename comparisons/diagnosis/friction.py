@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import KEPT, OF_FALLS, TIPS, UNTURNED, WATCHED, Answer, Finding, judged
-from dropspin.comparisons.diagnosis.landing import tilt
+from dropspin.comparisons.diagnosis.answers import KEPT, MOVES, OF_FALLS, TIPS, UNTURNED, WATCHED, Answer, Finding, judged
+from dropspin.comparisons.diagnosis.landing import is_at_rest, tilt
 from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
 from dropspin.scenarios.rotations import rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
@@ -18,6 +18,8 @@ LONGEST_SLIDE = 5.0  # m
 LONG_SLIDE = 0.25  # s, within which a body stops
 SHORT = 0.1
 """Relative error up to which a shorter slide says more of the time in which soft contacts take up a load than of friction."""
+WAYS = ("0°", "45°")
+"""Directions of a slide, from an axis of the surface."""
 ONE_WAY = 0.05
 """Relative difference of two distances from which friction depends on direction."""
 
@@ -31,16 +33,18 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     blank = Answer("slide", "stopping distance", "m", speed=SLIDE, physical=free)
     if free > LONGEST_SLIDE:
         return [replace(blank, detail=f"more than {LONGEST_SLIDE:g} m: not simulated")]
+    if not is_at_rest(body):
+        return [replace(blank, direction=way, detail=MOVES) for way in WAYS]
     end = body.settled[-1:]
     rests = [body.motions(end, dt, math.ceil(WATCHED / dt), -facts.gravity * UP, floor=True)[0, -1] for dt in dts]
     half = math.sqrt(0.5)
     along, across = (_stops(body, dts, rests, direction) for direction in (np.array([1.0, 0.0, 0.0]), np.array([half, 0.0, half])))
     if not along or not across:
-        return [replace(blank, direction=way, detail=TIPS) for way in ("0°", "45°")]
-    ways = (("0°", along), ("45°", across))
+        return [replace(blank, direction=way, detail=TIPS) for way in WAYS]
+    ways = zip(WAYS, (along, across), strict=True)
     answers = [judged(body, replace(blank, direction=way), dts, stops, [exact] * len(dts), OF_FALLS) for way, stops in ways]
     if not math.isnan(facts.friction_across):
-        return [answers[0], replace(blank, direction="45°", physical=math.nan, measured=across[0])]
+        return [answers[0], replace(blank, direction=WAYS[1], physical=math.nan, measured=across[0])]
     if SLIDE / (facts.friction * facts.gravity) < LONG_SLIDE:
         answers = [_of_short_slide(one) for one in answers]
     turns = min(abs(second / first - 1.0) for first, second in zip(along, across, strict=True)) > ONE_WAY
@@ -86,12 +90,14 @@ def creep(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     facts, dt = body.facts, dts[0]
     if not facts.lands or not facts.friction > 0.0 or _is_ball(facts):
         return []
+    answer = Answer("slide", "creep on a slope of half of the friction", "m/s", physical=0.0)
+    if not is_at_rest(body):
+        return [replace(answer, detail=MOVES)]
     slope = math.atan(0.5 * facts.friction)
     gravity = facts.gravity * np.array([math.sin(slope), -math.cos(slope), 0.0])
     start = body.settled[-1:].copy()
     start[:, VELOCITY] = start[:, SPIN] = 0.0
     states = body.motions(start, dt, math.ceil(1.0 / dt), gravity, floor=True)[0]
-    answer = Answer("slide", "creep on a slope of half of the friction", "m/s", physical=0.0)
     if tilt(states) > UNTURNED:
         return [replace(answer, detail=TIPS)]
     half = len(states) // 2
@@ -100,22 +106,31 @@ def creep(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
 
 
 def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
-    """The speed that a ball keeps as it rolls for a second."""
+    """The speed that a ball keeps as it rolls for a second.
+
+    The second begins when the ball rolls without slip: above a soft surface, its speed is not that of its radius.
+    """
     facts = body.facts
     if not facts.lands or not _is_ball(facts):
         return []
+    answer = Answer("roll", KEPT, "1", speed=1.0, physical=1.0)
+    if not is_at_rest(body):
+        return [replace(answer, detail=MOVES)]
     radius, inertia = float(facts.colliding[0].shape.semi_axes[0]), float(facts.principal[0].mean())
     start = body.settled[-1:].copy()
     start[:, VELOCITY], start[:, SPIN] = [1.0, 0.0, 0.0], [0.0, 0.0, -1.0 / radius]
-    ends = [body.motions(start, dt, round(1.0 / dt), -facts.gravity * UP, floor=True)[0, -1] for dt in dts]
-    kept = [end[VELOCITY][0] for end in ends]
-    answer = Answer("roll", KEPT, "1", speed=1.0, physical=1.0)
-    if facts.rolling or not facts.friction or facts.falls.cubic:
-        return [replace(answer, measured=float(kept[0]))]
+    kept, exact = [], []
     heavy = facts.mass + facts.armature + (inertia + facts.armature) / radius**2
     drag = (facts.falls.linear + facts.spins[0].linear / radius**2, facts.falls.quadratic + facts.spins[0].quadratic / radius**3)
-    exact = float(spin_about_axis(1.0, 1.0, heavy, 0.0, *drag))
-    return [judged(body, answer, dts, kept, [exact] * len(dts))]
+    for dt in dts:
+        before, steps = round(WATCHED / dt), round(1.0 / dt)
+        states = body.motions(start, dt, before + steps, -facts.gravity * UP, floor=True)[0]
+        first, last = (float(states[row][VELOCITY][0]) for row in (before, -1))
+        kept.append(last / first if first else 0.0)
+        exact.append(float(spin_about_axis(1.0, first, heavy, 0.0, *drag)) / first if first else 0.0)
+    if facts.rolling or not facts.friction or facts.falls.cubic:
+        return [replace(answer, measured=kept[0])]
+    return [judged(body, answer, dts, kept, exact)]
 
 
 def _is_ball(facts: Facts) -> bool:

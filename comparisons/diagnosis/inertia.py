@@ -55,8 +55,9 @@ def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | Non
                 "inertia", "distance of the centre of mass from a solid's", "m", measured=float(np.linalg.norm(off)), findings=(finding,)
             )
             return
-        excess = factor if (factor := largest / largest_possible(given, points)) > INERTIA_ROUNDING else excess
-        quantity, possible = "largest moment / largest possible", "at most 1 for this mass and shape"
+        quantity, possible = "second moments / largest possible", "at most 1 for this mass and shape"
+        if (factor := largest / largest_possible(given, points)) > INERTIA_ROUNDING:
+            quantity, excess = "largest moment / largest possible", factor
     finding = Finding("impossible", ("inertia",), remedies, possible)
     yield Answer("inertia", quantity, "1", measured=excess, physical=float(least > 0.0), findings=(finding,))
 

@@ -138,13 +138,16 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     support = [Answer("rest", "support", "", detail="none", findings=(through,))] if facts.missed else []
     if not facts.lands:
         return support
-    noteworthy = NOTEWORTHY * max(float(np.linalg.norm(facts.points, axis=1).max()), 1e-12)
+    noteworthy = _noteworthy(facts)
     depth, speed, tips = _at_rest(body, dts[0])
     depth_error, moving = abs(depth - facts.rest_depth), 0.0 if tips else speed
     is_wrong = depth_error > noteworthy or moving > noteworthy
     finest_depth, finest_speed, _ = _at_rest(body, dts[-1]) if is_wrong else (depth, speed, tips)
     floats = facts.margin > 0.0 and -depth > noteworthy
-    of_depth = (Finding("setting", ("margin",)),) * floats + _of_error(facts, depth_error, abs(finest_depth - facts.rest_depth), noteworthy)
+    of_depth = _of_error(facts, depth_error, abs(finest_depth - facts.rest_depth), noteworthy)
+    if math.isinf(facts.rest_depth):
+        of_depth = (Finding("setting", _written(facts), detail="and grows without end: a contact without stiffness holds no body"),)
+    of_depth = (Finding("setting", ("margin",)),) * floats + of_depth
     of_speed = _of_error(facts, moving, finest_speed, noteworthy)
     return [
         *support,
@@ -162,8 +165,13 @@ def _of_error(facts: Facts, error: float, finest: float, noteworthy: float) -> t
         return ()
     if finest < 0.6 * error:
         return (Finding("time step", ("timestep",)),)
-    written = tuple(name for name in OF_CONTACT if name in facts.settings and facts.settings[name].file)
-    return (Finding("setting", written) if written else Finding("model", ("timestep",)),)
+    acting = (*facts.unknown, *_written(facts))
+    return (Finding("setting", acting) if acting else Finding("model", ("timestep",)),)
+
+
+def _written(facts: Facts) -> tuple[str, ...]:
+    """The settings of contacts that the file has."""
+    return tuple(name for name in OF_CONTACT if name in facts.settings and facts.settings[name].file)
 
 
 def _at_rest(body: LooseBody, dt: float) -> tuple[float, float, bool]:
@@ -172,6 +180,17 @@ def _at_rest(body: LooseBody, dt: float) -> tuple[float, float, bool]:
     last = states[-math.ceil(0.5 / dt) :]
     speed = float(np.linalg.norm(np.ptp(last[:, POSITION], axis=0))) / 0.5
     return -float(body.facts.lowest(last).mean()), speed, tilt(states) > UNTURNED
+
+
+def is_at_rest(body: LooseBody) -> bool:
+    """Whether a body that was put down neither rises nor falls in the last half second, to 1 % of its size."""
+    last = body.settled[-math.ceil(0.5 / body.facts.dt) :]
+    return bool(np.ptp(last[:, POSITION][:, 1]) <= _noteworthy(body.facts))
+
+
+def _noteworthy(facts: Facts) -> float:
+    """A length from which a difference is noteworthy [m]."""
+    return NOTEWORTHY * max(float(np.linalg.norm(facts.points, axis=1).max()), 1e-12)
 
 
 def tilt(states: Array) -> float:

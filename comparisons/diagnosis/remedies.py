@@ -40,11 +40,16 @@ class Targets(NamedTuple):
             finding = Finding("target", detail=f"the target is {self.wanted[quantity]:g}, but {why}")
             yield Answer(question, quantity, "1", detail="not measured", findings=(finding,))
 
+    def meets(self, answer: Answer) -> bool:
+        """Whether an answer has no target, or is within 0.01 of it."""
+        wanted = self.wanted.get(answer.quantity)
+        return wanted is None or abs(answer.measured - wanted) <= NOTEWORTHY
+
     def _judged(self, body: LooseBody, answer: Answer) -> Answer:
         """An answer that misses its target as a finding, with settings for the restitution if they come closer."""
-        wanted = self.wanted.get(answer.quantity)
-        if wanted is None or abs(answer.measured - wanted) <= NOTEWORTHY:
+        if self.meets(answer):
             return answer
+        wanted = self.wanted[answer.quantity]
         remedies: list[Remedy] = []
         if answer.quantity == REBOUND:
             for step in (body.facts.dt, _rounded(0.125 * body.facts.dt)):
@@ -57,8 +62,11 @@ class Targets(NamedTuple):
         return replace(answer, findings=(*answer.findings, finding))
 
 
-def answers_to(question: Question, body: LooseBody) -> Iterator[Answer]:
-    """The answers to a question, each finding with the remedies that remove it; of a breakdown, the reason."""
+NO_TARGETS = Targets()
+
+
+def answers_to(question: Question, body: LooseBody, targets: Targets = NO_TARGETS) -> Iterator[Answer]:
+    """The answers to a question, each finding with the remedies that remove it and miss no target; of a breakdown, the reason."""
     dt = body.facts.dt
     try:
         answers = question(body, [dt * factor for factor in HALVINGS])
@@ -82,7 +90,11 @@ def answers_to(question: Question, body: LooseBody) -> Iterator[Answer]:
             return next((other.effect for other in again(reverted, dt)[n : n + 1]), math.nan)
 
         explained = [_explained(body, finding, effect) for finding in answer.findings]
-        findings = [_remedied(body, answer, finding, lambda *tried, n=number: again(*tried)[n : n + 1]) for finding in explained]
+
+        def suitable(settings: tuple[str, ...], step: float, n: int = number, before: Answer = answer) -> list[Answer]:
+            return [other for other in again(settings, step)[n : n + 1] if targets.meets(other) or not targets.meets(before)]
+
+        findings = [_remedied(body, answer, finding, suitable) for finding in explained]
         yield replace(answer, findings=tuple(findings))
 
 

@@ -235,7 +235,7 @@ def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | 
     key = body.likeness
     if key in known:
         return known[key]._replace(name=name)
-    answers = inertia(facts) + [answer for question in QUESTIONS for answer in answers_to(question, body)]
+    answers = inertia(facts) + [answer for question in QUESTIONS for answer in answers_to(question, body, targets)]
     if facts.surface:
         frictions = (facts.friction, facts.friction_across)
         answers += [Answer("friction", COEFFICIENT, "1", measured=one) for one in frictions if not math.isnan(one)]

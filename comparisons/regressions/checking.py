@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ import pandas as pd
 from dropspin.comparisons.judging.convergence import STUDIES
 from dropspin.comparisons.judging.verdicts import FAILURES, Verdict
 from dropspin.comparisons.regressions.attribution import CORRECTION, Attribution, attribute, common_settings
-from dropspin.comparisons.regressions.baseline import COLUMNS, Acceptance, Baseline
+from dropspin.comparisons.regressions.baseline import COLUMNS, Acceptance, Baseline, load_baseline
 from dropspin.comparisons.regressions.changes import (
     KEY,
     Motion,
@@ -35,6 +36,7 @@ from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.table import Measurement, as_table
 from dropspin.scenarios import DropspinError
+from dropspin.scenarios.validation import validated
 
 VERDICTS: dict[str, Verdict] = {"same": "passed", "better": "passed", "worse": "failed", "moved": "failed", "gone": "failed"}
 ACCEPTED = {"order": "accepted order", "asymptotic_error": "accepted asymptotic error", "ensemble": "accepted mean"}
@@ -85,7 +87,7 @@ def accept(
         `before` in `unit`, and the `change`: new, worse, moved, better, same or gone.
 
     Raises:
-        DropspinError: The run was made with `quick`.
+        DropspinError: The run was made with `quick`, or the reason is empty or has several lines.
     """
     verify_comparable(results)
     measured, covered = comparable_results(results), asked_for(earlier.results, results)
@@ -100,9 +102,8 @@ def accept(
     stamp = results.provenance
     adapters = {engine: code for engine, code in stamp["adapters"].items() if code is not None and (measured["engine"] == engine).any()}
     settings = {engine: common_settings(stamp, engine) for engine in adapters}
-    acceptance = Acceptance(
-        date=date, reason=reason, versions=versions_behind(stamp), code=stamp["code"], adapters=adapters, settings=settings
-    )
+    content = {"date": date, "reason": reason, "versions": versions_behind(stamp), "code": stamp["code"]}
+    acceptance = validated(Acceptance, "accept", content | {"adapters": adapters, "settings": settings})
     moved = measured[~_keys(measured).isin(_keys(kept))].assign(by=acceptance.key)
     outside = earlier.results.drop(covered.index)
     table = pd.concat([outside[~_has_other_scene(outside, earlier, results)], kept, moved], ignore_index=True)[list(COLUMNS)]
@@ -117,7 +118,7 @@ def accept(
     return accepted, found[~lost]
 
 
-def check(results: Results, baseline: Baseline | None = None) -> Checked:
+def check(results: Results, baseline: Baseline | str | Path | None = None) -> Checked:
     """Compare a run with accepted results.
 
     A result fails if it is absent, or worse than the accepted result by more than the tolerance; a better result passes. A failed check
@@ -126,7 +127,7 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
 
     Args:
         results: The run.
-        baseline: The accepted results, from `load_baseline`; with None, only the checks of the run itself count.
+        baseline: The accepted results, from `load_baseline`, or their file; with None, only the checks of the run itself count.
 
     Returns:
         `results`, the run with a row of kind `baseline` for each accepted result, whose `exit_code()` is that of the check;
@@ -136,6 +137,8 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
         DropspinError: The run was made with `quick`, and there is a baseline.
         NothingAccepted: The run covers no accepted result, so there is nothing to check. If engines broke down, this is reported instead.
     """
+    if isinstance(baseline, str | Path):
+        baseline = load_baseline(baseline)
     if baseline is None:
         nothing = comparable_results(results).iloc[:0]
         return Checked(results, changes(nothing, nothing), nothing)

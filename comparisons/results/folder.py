@@ -172,6 +172,19 @@ def unfinished_folder(place: Path, name: str = "") -> Iterator[Path]:
         yield folder
 
 
+@contextmanager
+def one_at_a_time(path: str | Path) -> Iterator[None]:
+    """Let one process of a user at a time read, change and write a file; others wait. The lock is no file beside it."""
+    of_file = hashlib.sha256(os.fsencode(Path(path).resolve())).hexdigest()[:16]
+    lock = FileLock(Path(tempfile.gettempdir(), f"dropspin-{getattr(os, 'getuid', int)()}-{of_file}.lock"))
+    with suppress(NotImplementedError):  # a file system without locks
+        lock.acquire()
+    try:
+        yield
+    finally:
+        lock.release()
+
+
 def is_unfinished(name: str) -> bool:
     """Whether a file or folder has the name of one that a killed process may have left."""
     return name.startswith(".") and _UNFINISHED in name

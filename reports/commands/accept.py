@@ -32,6 +32,7 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
 
     from dropspin.comparisons.regressions.baseline import Baseline, load_baseline, write_baseline
     from dropspin.comparisons.regressions.checking import accept
+    from dropspin.comparisons.results.folder import one_at_a_time
     from dropspin.comparisons.results.store import load_results
     from dropspin.reports.document import Document, Sentences
     from dropspin.reports.stories.check import accepted_sentences
@@ -41,15 +42,18 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
 
     if not reason.strip():
         raise click.UsageError("--reason is empty; give the reason why these results are accepted.")
-    new = load_baseline(baseline) if os.path.exists(baseline) else Baseline()
-    changes, sentences = [], []
-    for run in runs:
-        results = load_results(Path(run), arrays=False)
-        new, accepted = accept(results, new, reason.strip(), datetime.date.today(), known_failures=known_failures)
-        changes += accepted.to_dict("records")
-        sentences += accepted_sentences(results, accepted, known_failures)
-    if new.results.empty:
-        raise DropspinError(f"{', '.join(runs)}: there is nothing to accept, because no engine was measured; {baseline} is not written.")
-    write_baseline(new, baseline)
+    with one_at_a_time(baseline):  # two commands that accept into one file lose no result
+        new = load_baseline(baseline) if os.path.exists(baseline) else Baseline()
+        changes, sentences = [], []
+        for run in runs:
+            results = load_results(Path(run), arrays=False)
+            new, accepted = accept(results, new, reason.strip(), datetime.date.today(), known_failures=known_failures)
+            changes += accepted.to_dict("records")
+            sentences += accepted_sentences(results, accepted, known_failures)
+        if new.results.empty:
+            raise DropspinError(
+                f"{', '.join(runs)}: there is nothing to accept, because no engine was measured; {baseline} is not written."
+            )
+        write_baseline(new, baseline)
     written = f"{baseline}, {counted(len(new.results), 'accepted result')}. Review the difference and commit it."
     print_json_or(json_output, changes, Document("Accepted results", [Sentences(sentences)]), written)

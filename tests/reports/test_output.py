@@ -2,11 +2,13 @@
 
 import csv
 import json
+from concurrent.futures import ThreadPoolExecutor
+from time import sleep
 
 import pytest
 from support.cli import dropspin
 
-from dropspin.comparisons.results.folder import study_folder, written_whole
+from dropspin.comparisons.results.folder import one_at_a_time, study_folder, written_whole
 from dropspin.reports.output import write_table
 
 
@@ -67,3 +69,20 @@ def test_folder_of_a_study_replaces_that_of_an_earlier_one(tmp_path):
             (folder / "scenes").mkdir()
             (folder / "scenes" / f"{name}.toml").touch()
     assert [path.name for path in (tmp_path / "scenes").iterdir()] == ["late.toml"]
+
+
+def test_commands_that_change_a_file_take_turns(tmp_path):
+    """Each adds a line to what it read before; without turns, most lines are lost."""
+    path = tmp_path / "baseline.toml"
+    path.touch()
+
+    def add(line):
+        with one_at_a_time(path):
+            before = path.read_text()
+            sleep(0.01)
+            path.write_text(f"{before}{line}\n")
+
+    with ThreadPoolExecutor(8) as workers:
+        list(workers.map(add, range(8)))
+    assert sorted(path.read_text().split()) == [str(line) for line in range(8)]
+    assert list(tmp_path.iterdir()) == [path]

@@ -323,7 +323,8 @@ def test_tied_body_is_not_free_and_what_acts_on_a_body_is_named(tmp_path):
 def test_settings_for_a_restitution_are_tried(tmp_path):
     for integrator, dt in (("Euler", 2e-3), ("RK4", 2.5e-4)):
         body = body_of(tmp_path, FREE.format('<geom size=".05"/>'), f'integrator="{integrator}"')
-        [missed] = [Targets(0.5, None).judge(body, answer) for answer in impact(body, [2e-3]) if answer.speed == 3.0]
+        answers = [answer for answer in impact(body, [2e-3]) if answer.speed == 3.0]
+        [missed] = Targets(0.5, None).judged(body, answers)
         [remedy] = missed.findings[-1].remedies
         assert remedy.value == pytest.approx(0.5, abs=0.02)
         assert (f'timestep="{dt:g}"' in remedy.text) is (dt != 2e-3)

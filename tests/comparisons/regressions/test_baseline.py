@@ -51,6 +51,15 @@ def test_baseline_is_read_as_it_was_written(accepted, text, tmp_path):
     assert (tmp_path / "again.toml").read_text() == text
 
 
+def test_file_is_taken_in_place_of_a_baseline_and_a_wrong_reason_is_named(release, text, tmp_path):
+    path = tmp_path / "accepted.toml"
+    path.write_text(text)
+    assert check(release(Candidate), str(path)).changes.equals(check(release(Candidate), load_baseline(path)).changes)
+    for reason, problem in (("", "must have at least 1 item, has 0"), ("two\nlines", "must be one line of printable text")):
+        with pytest.raises(DropspinError, match=f"reason: got .*{problem}"):
+            accept(release(Candidate), Baseline(), reason, TODAY)
+
+
 def test_example_in_the_documentation_is_read(tmp_path):
     page = Path(__file__).parents[3] / "docs" / "gate.md"
     (tmp_path / "example.toml").write_text(page.read_text(encoding="utf-8").split("```toml\n")[1].split("```")[0])

@@ -1,0 +1,108 @@
+"""Contacts of MJCF files in MuJoCo: targets, bodies that roll on soft surfaces or do not rest, and remedies that keep a target."""
+
+import pytest
+from support.model_files import FREE, body_of, findings_of, ladder
+
+from dropspin.comparisons.diagnosis.answers import COEFFICIENT, MOVES, REBOUND, Answer
+from dropspin.comparisons.diagnosis.friction import creep, roll, slide
+from dropspin.comparisons.diagnosis.inertia import inertia
+from dropspin.comparisons.diagnosis.landing import impact, rest
+from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
+from dropspin.comparisons.diagnosis.study import BodyDiagnosis, Diagnosis, diagnose
+from dropspin.scenarios import DropspinError
+
+BALL = FREE.format('<geom size=".05" mass="1" {}/>')
+
+
+@pytest.mark.parametrize(
+    ("geom", "option", "why"),
+    [
+        ('contype="0" conaffinity="0"', "", "floor does not hold it, because no geometry of the body collides with it"),
+        ("", 'gravity="0 -9.81 0"', "the body lands on no surface"),
+        ("", 'gravity="0 0 0"', "gravity does not hold the body on a surface"),
+    ],
+)
+def test_target_that_nothing_is_measured_for_is_missed(tmp_path, geom, option, why):
+    body = body_of(tmp_path, BALL.format(geom), option)
+    answers = list(Targets(0.5, 0.3).judged(body, [*impact(body, ladder(body)), *rest(body, ladder(body))]))
+    found = {answer.quantity: finding.detail for answer in answers for finding in answer.findings if finding.kind == "target"}
+    assert found == {REBOUND: f"the target is 0.5, but {why}", COEFFICIENT: f"the target is 0.3, but {why}"}
+
+
+def test_both_coefficients_of_a_pair_are_judged(tmp_path):
+    """MuJoCo's own slides along the two axes take 32 and 64 mm: v²/2µg with 0.4 and 0.2."""
+    body = '<body name="b" pos="0 0 1"><freejoint/><geom name="g" type="box" size=".1 .1 .1"/></body>'
+    text = f'<worldbody><geom name="f" type="plane" size="0 0 1"/>{body}</worldbody>'
+    pair = '<contact><pair geom1="f" geom2="g" friction="0.4 0.2"/></contact>'
+    (tmp_path / "pair.xml").write_text(f"<mujoco>{text}{pair}</mujoco>")
+    [body] = diagnose(tmp_path / "pair.xml", friction=0.2).bodies
+    assert {body.friction, body.friction_across} == {0.2, 0.4}
+    assert [answer.measured for answer, finding in body.findings if finding.kind == "target"] == [0.4]
+
+
+@pytest.mark.parametrize("geom", ['solref="0.2 1"', 'margin="0.003"'], ids=["6 mm deep", "3 mm above"])
+def test_ball_on_a_soft_surface_keeps_its_speed_when_it_rolls(tmp_path, geom):
+    """MuJoCo's contact is not at the radius of the ball, so that a start with v = ωr slips: it would keep 0.98 or 1.01."""
+    body = body_of(tmp_path, BALL.format(geom))
+    [answer] = roll(body, ladder(body))
+    assert answer.measured == pytest.approx(1.0, abs=1e-3)
+    assert answer.findings == ()
+
+
+def test_slides_of_a_body_that_does_not_rest_have_no_number(tmp_path):
+    """At 2 ms the contact throws the box up; at 0.5 ms it rests, and slides as far as Coulomb's law says."""
+    geom = '<geom type="box" size=".05 .05 .02" mass="1" friction="0.2" priority="1" solref="0.004 0.2"/>'
+    body = body_of(tmp_path, FREE.format(geom), 'cone="elliptic"')
+    assert {answer.detail for answer in [*slide(body, ladder(body)), *creep(body, ladder(body))]} == {MOVES}
+    assert [finding.kind for _, finding in findings_of(body, rest)] == ["time step"] * 2
+    fine = body_of(tmp_path, FREE.format(geom), 'cone="elliptic" timestep="0.0005"')
+    assert [answer.measured for answer in slide(fine, ladder(fine))] == pytest.approx([0.5**2 / (2 * 0.2 * 9.81)] * 2, rel=0.01)
+
+
+def test_drift_in_a_wind_is_due_to_the_density(tmp_path):
+    geom = '<geom type="ellipsoid" size=".2 .2 .01" mass="0.02" fluidshape="ellipsoid"/>'
+    body = body_of(tmp_path, FREE.format(geom), 'density="1.2" viscosity="0.00002" wind="3 0 0"')
+    [(answer, finding)] = findings_of(body, rest)
+    assert (answer.quantity, finding.kind, finding.settings) == ("drift speed", "setting", ("density",))
+    assert finding.remedies[0].value < 1e-6
+
+
+def test_remedy_that_misses_the_target_is_not_given(tmp_path):
+    """A damper without stiffness gives its restitution at one time step only; a finer one, which would remove the finding, gives 0."""
+    damper = 'solref="0 -1500" solimp="0.9999 0.9999 0.001 0.5 2" priority="9"'
+    body = body_of(tmp_path, BALL.format(damper), 'timestep="0.001"')
+    of_targets = {}
+    for target in (None, 0.5):
+        answers = list(answers_to(impact, body, Targets(target)))
+        of_targets[target] = [remedy.value for answer in answers for finding in answer.findings for remedy in finding.remedies]
+    assert of_targets == {None: pytest.approx([0.0] * 3), 0.5: []}
+    [(answer, finding)] = findings_of(body, rest)
+    assert (answer.quantity, finding.kind, finding.settings) == ("penetration", "setting", ("solref", "solimp"))
+    assert finding.detail == "and grows without end: a contact without stiffness holds no body"
+
+
+def test_moments_that_are_each_possible_but_not_together_are_named(tmp_path):
+    """Of a plate of 2 mm: z² mass of (Ixx + Iyy - Izz)/2 = 5e-4 kg m², and at most m c² = 1e-6 kg m²."""
+    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="0.003 0.003 0.005"/><geom type="box" size=".1 .1 .001"/>'
+    [answer] = [answer for answer in inertia(body_of(tmp_path, FREE.format(inertial)).facts) if answer.findings]
+    assert answer.quantity == "second moments / largest possible"
+    assert answer.measured == pytest.approx(500.0, rel=0.01)
+
+
+@pytest.mark.parametrize("step", ["0", "-0.002", "nan", "10"])
+def test_time_step_that_resolves_no_motion_is_refused(tmp_path, step):
+    with pytest.raises(
+        DropspinError, match=rf'model.xml: timestep="{step}" \(model.xml, line 1\): a time step must be above 0 and at most'
+    ):
+        body_of(tmp_path, BALL.format(""), f'timestep="{step}"')
+
+
+def test_body_without_a_result_is_not_a_sound_one():
+    """One that another engine has a result for counts only if the engine broke down."""
+    sound, declined = (
+        BodyDiagnosis("a", "mujoco", answers=(Answer("fall", "", ""),)),
+        BodyDiagnosis("a", "pybullet", breakdown="x", declined=True),
+    )
+    assert not Diagnosis("f", (sound, declined)).broke_down
+    assert Diagnosis("f", (sound, declined._replace(declined=False))).broke_down
+    assert Diagnosis("f", (sound, declined._replace(name="b"))).broke_down

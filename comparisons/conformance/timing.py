@@ -145,7 +145,7 @@ def check_velocity_lag(engine: Engine) -> str:
             f"displacement of a falling body; {_suggested_lag(measured)}"
         )
     if min(abs(ahead), abs(ahead - measured)) > LAG_TOLERANCE:  # a leapfrog scheme is not ahead, others by their lag
-        raise CheckFailed(f"a fall runs ahead of the exact one by {ahead:.3g} steps; {NO_SCHEME}")
+        raise CheckFailed(f"a fall is {abs(ahead):.3g} steps {'ahead of' if ahead > 0.0 else 'behind'} the exact one; {NO_SCHEME}")
     if explicit:
         raise Noted(EXPLICIT_EULER)
     return f"velocity lags position by {stated:.3g} steps"

@@ -182,19 +182,40 @@ def _never_rests(motion: ExtendedMotion, whole: Comparison) -> Iterator[Diagnosi
         yield Diagnosis("inaccurate", "never rests", fastest / allowed, message)
 
 
-def held_speeds(motion: Trajectory) -> dict[str, float]:
-    """The largest speeds [m/s, rad/s], components or norms, that are possibly clamped.
+class HeldSpeed(NamedTuple):
+    """The largest values that the components of a velocity and its length have, where they are possibly clamped [m/s, rad/s].
 
     Such a speed is reduced after the first step, or is suddenly constant to the last digit. Both may have other causes, unless another
     initial state gives the same value.
     """
-    held: dict[str, float] = {}
+
+    components: tuple[float, ...]
+    norm: float
+
+    def shared(self, other: "HeldSpeed") -> float:
+        """The value at which this speed and that from another initial state are clamped; NaN if they are not."""
+        components = [
+            value for value in self.components if any(math.isclose(value, of_other, rel_tol=1e-9) for of_other in other.components)
+        ]
+        most = max(components, default=math.nan)
+        if not math.isclose(self.norm, other.norm, rel_tol=1e-9):
+            return most
+        alike = sum(math.isclose(value, most, rel_tol=1e-9) for value in components)
+        are_components = math.isclose(self.norm, math.sqrt(alike) * most, rel_tol=1e-9)  # each of them is clamped, and so is the length
+        return most if are_components else self.norm
+
+
+def held_speeds(motion: Trajectory) -> dict[str, HeldSpeed]:
+    """The velocity and angular velocity of which the length or a component is possibly clamped."""
+    held = {}
     for name in ("velocity", "angular_velocity"):
         components = np.abs(getattr(motion, name))
+        values = []
         for sizes in (*components.T, length(components)):
             largest = float(sizes[1:].max())
-            if largest > 0.0 and _is_held(sizes, largest):
-                held[name] = max(largest, held.get(name, 0.0))
+            values.append(largest if largest > 0.0 and _is_held(sizes, largest) else math.nan)
+        if not np.isnan(values).all():
+            held[name] = HeldSpeed(tuple(values[:3]), values[3])
     return held
 
 
@@ -212,8 +233,9 @@ def clamped(motion: Trajectory, other: Trajectory) -> list[Diagnosis]:
     """Speeds that are possibly clamped and are equal, to the last digit, from two different initial states."""
     units = {"velocity": "m/s", "angular_velocity": "rad/s"}
     first, second = held_speeds(motion), held_speeds(other)
+    values = {name: first[name].shared(second[name]) for name in first.keys() & second.keys()}
     return [
-        Diagnosis("clamped", f"{name} clamped", value, f"{name.replace('_', ' ')} is clamped at {value:.6g} {units[name]}")
-        for name, value in first.items()
-        if math.isclose(value, second.get(name, math.nan), rel_tol=1e-9)
+        Diagnosis("clamped", f"{name} clamped", values[name], f"{name.replace('_', ' ')} is clamped at {values[name]:.6g} {unit}")
+        for name, unit in units.items()
+        if not math.isnan(values.get(name, math.nan))
     ]

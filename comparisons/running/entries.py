@@ -4,8 +4,8 @@ import sys
 from collections.abc import Iterable, Sequence
 
 from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissing
+from dropspin.comparisons.engines.registry import BUILT_IN, is_foreign, parsed
 from dropspin.comparisons.engines.registry import engine as engine_named
-from dropspin.comparisons.engines.registry import is_foreign, parsed
 from dropspin.comparisons.engines.stand_in import Traits, stand_in, traits
 from dropspin.comparisons.running.inputs import EngineEntry, described_value, several
 from dropspin.comparisons.running.processes import ONE_MINUTE, EngineProcesses, ResourceLimits
@@ -36,8 +36,30 @@ def engine_entry(engine: Engine | str, resources: ResourceLimits = ONE_MINUTE) -
 
 
 def engine_entries(engines: Engine | str | Iterable[Engine | str], default: Sequence[str] = ()) -> list[EngineEntry]:
-    """One engine or several, or default ones if none is given, each once."""
-    return list({entry.label: entry for entry in map(engine_entry, several("engines", engines) or default)}.values())
+    """One engine or several, or default ones if none is given, each once.
+
+    Raises:
+        DropspinError: Two different engines have the same name.
+    """
+    entries: dict[str, EngineEntry] = {}
+    origins: dict[str, str] = {}
+    for asked in several("engines", engines) or default:
+        entry = engine_entry(asked)
+        origin = _origin(asked)
+        if entries.setdefault(entry.label, entry) is not entry and origins[entry.label] != origin:
+            both = " and ".join((origins[entry.label], origin))
+            raise DropspinError(f"engines: {both} both have the name {entry.label}; give one of them another name.")
+        origins[entry.label] = origin
+    return list(entries.values())
+
+
+def _origin(asked: Engine | str) -> str:
+    """The name of an engine of dropspin, or the class of another one with its module."""
+    if isinstance(asked, str):
+        return parsed(asked.strip())[0]
+    kind = type(asked)
+    is_own = asked.name in BUILT_IN and kind.__module__ == BUILT_IN[asked.name].module
+    return asked.name if is_own else f"{kind.__module__}:{kind.__qualname__}"
 
 
 def present_entry(engine: Engine | str) -> EngineEntry:

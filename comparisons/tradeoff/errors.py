@@ -17,6 +17,7 @@ import numpy as np
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown, record, verify_accepted
@@ -37,6 +38,8 @@ FEWEST_POINTS = 6
 """The smallest number of time steps that shows a minimum of the error, or convergence to another motion."""
 CONVERGED = 0.3
 """The share of the largest error of the motion below which the smallest must be."""
+WRONG = 0.01
+"""The error of a motion, in rad or relative to the scene, up to which it is not wrong, also if it does not fall."""
 SMALL, PATIENCE, PATIENCE_WHILE_LARGE = 1e-6, 2, 6
 
 
@@ -60,6 +63,11 @@ class Ladder:
     ended: Ending
     reason: str
     left_out: str = ""
+
+    @property
+    def completed(self) -> tuple[tuple[float, float], ...]:
+        """The time steps without one at which the engine's process failed, such as one that takes too long."""
+        return self.steps[:-1] if self.ended == "failed" else self.steps
 
 
 def output_interval(scene: Scenario) -> float:
@@ -111,7 +119,7 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
             ended, reason = "budget", f"the budget of {budget:g} s of processor time was spent"
             break
     steps = tuple((dt, errors[0]) for dt, errors in tried)
-    return Ladder(entry.label, steps, ended, reason, _left_out(tried, metrics[1], reason))
+    return Ladder(entry.label, steps, ended, reason, _left_out(scene, tried, metrics[1], reason))
 
 
 def _stalled(errors: Sequence[float]) -> int:
@@ -121,14 +129,14 @@ def _stalled(errors: Sequence[float]) -> int:
     return patience if stays else 0
 
 
-def _left_out(tried: Sequence[tuple[float, list[float]]], metric: str, reason: str) -> str:
-    """The reason why an engine is left out: no error is finite, or the errors of the motion do not fall; empty if it takes part."""
+def _left_out(scene: Scenario, tried: Sequence[tuple[float, list[float]]], metric: str, reason: str) -> str:
+    """The reason why an engine is left out: no error is finite, or large errors of the motion do not fall; empty if it takes part."""
     first, last = (f"{1e3 * tried[place][0]:.4g} ms" for place in (0, -1))
     range_tried = f"{len(tried)} time steps tried, {first} to {last}" if len(tried) > 1 else f"only time step tried, {first}"
     errors = [motion for _, (_, motion) in tried if np.isfinite(motion)]
     if not errors:
         return f"no error is finite at the {range_tried}: {reason}"
-    if len(errors) > FEWEST_POINTS and max(errors) > SMALL and min(errors) > CONVERGED * max(errors):
+    if len(errors) > FEWEST_POINTS and min(errors) > max(CONVERGED * max(errors), WRONG * scale(scene, METRICS[metric].unit)):
         unit = "" if METRICS[metric].unit == "1" else f" {METRICS[metric].unit}"
         return f"no convergence observed: {metric.replace('_', ' ')} is {min(errors):.3g} to {max(errors):.3g}{unit} at the {range_tried}"
     return ""

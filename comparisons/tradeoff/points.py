@@ -144,8 +144,8 @@ class TradeOff:
         Args:
             within: The tolerance, in the metric's unit.
 
-        A time step counts only if the errors at all smaller time steps of the engine are also within the tolerance. Otherwise its error may
-        be small by chance, because it changes sign near this time step.
+        A time step counts only if the errors at all smaller time steps of the engine are finite and also within the tolerance. Otherwise
+        its error may be small by chance, because it changes sign near this time step.
         """
         cheapest = {point.engine: point for point in sorted(self._within(within), key=lambda point: point.typical_cost, reverse=True)}
         if not cheapest:
@@ -170,9 +170,12 @@ class TradeOff:
 
     def _within(self, within: float) -> list[CostPoint]:
         """The configurations within a tolerance, with those of the same engine at all finer time steps."""
-        points = sorted(self.points, key=lambda point: point.dt)
-        exceeding = {point.engine: point.dt for point in reversed(points) if point.error > within}  # the finest step of each engine
-        return [point for point in points if point.dt < exceeding.get(point.engine, math.inf)]
+        tried = [(ladder.engine, dt, error) for ladder in self.ladders for dt, error in ladder.completed]
+        finest: dict[str, float] = {}  # step at which an engine exceeds the tolerance, or has no finite error
+        for engine, dt, error in tried:
+            if not error <= within:
+                finest[engine] = min(dt, finest.get(engine, math.inf))
+        return [point for point in self.points if point.error <= within and point.dt < finest.get(point.engine, math.inf)]
 
 
 def _pareto_front(points: Sequence[CostPoint], cost: Callable[[CostPoint], float]) -> list[CostPoint]:

@@ -44,11 +44,13 @@ def limits_command(scenes: tuple[str, ...], axes: tuple[str, ...], output: str, 
 
     loaded = [load(name) for name in scenes or SCENES]
     if len({scene.name for scene in loaded}) < len(loaded):
-        raise click.UsageError("two scenes have the same name, which is that of the file; rename one of the files.")
-    having = [scene for scene in loaded if all(AXES[name].applies(scene) for name in {*axes} & AXES.keys())]
+        raise click.UsageError("a scene is given twice, or two files have the same name; give each scene once, or rename a file.")
+    own = {scene.name: [name for name in axes if name not in AXES or AXES[name].applies(scene)] for scene in loaded}
+    having = [scene for scene in loaded if own[scene.name] or not axes] or loaded[:1]  # the error of find_limits lists its axes
+    without = {scene.name: f"it has no axis {' or '.join(axes)}" for scene in loaded if scene not in having}
     results = []
     with written_study(output, json_output) as keep:
-        for scene in having or loaded[:1]:  # the error of find_limits lists the axes of a scene
+        for scene in having:
             with share_bar(scene.name) as on_progress:
-                results.append(find_limits(scene, axes=axes, **options, on_progress=on_progress))
-        keep(Limits(scenes=results))
+                results.append(find_limits(scene, axes=own[scene.name] or axes, **options, on_progress=on_progress))
+        keep(Limits(scenes=results, left_out=without))

@@ -5,6 +5,7 @@ from itertools import groupby
 from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from dropspin.comparisons.robustness.axes import AXES
 from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, ScanPoint
@@ -21,10 +22,11 @@ COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterio
 
 
 class Limits(Study):
-    """The results of `dropspin limits` in each scene."""
+    """The results of `dropspin limits` in each scene, and the scenes that have none of the axes."""
 
     study: Literal["limits"] = "limits"
     scenes: list[RobustnessStudy]
+    left_out: dict[str, str] = Field(default_factory=dict)
 
     def rows(self) -> Records:
         """A row for each tested value, and a row for each engine that is missing."""
@@ -37,6 +39,8 @@ class Limits(Study):
             charts = [Charts(study.scene.name, limits_charts(study))] if study.scans else []
             parts += [Heading(study.scene.name), Paragraph(nominal(study)), *charts, Table(range_rows(study))]
             parts.append(Sentences(sentences(study), numbered=True))
+        if self.left_out:
+            parts.append(Sentences(left_out(self.left_out)))
         steps = step_rows(self.scenes)
         summary: list[Part] = [Heading("The largest steps"), Table(steps), Paragraph(ACCURATE_AND_STABLE)] if steps else []
         return Document("Where engines break down", parts, summary)

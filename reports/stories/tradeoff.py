@@ -114,9 +114,22 @@ def sentences(study: TradeOff, within: Sequence[float]) -> list[str]:
         *(_recommendation(study, tolerance) for tolerance in within),
         *_timings(study),
         *([f"Memory per world in a batch of {study.worlds[-1]}: {memory}."] if memory else []),
+        *_undefined(study),
         *(f"No smaller time steps than these were tried, because {reason}: {engines}." for reason, engines in ends.items()),
         *left_out(study.left_out),
     ]
+
+
+def _undefined(study: TradeOff) -> list[str]:
+    """A sentence for each engine that diverges, or has no error, at time steps below one at which it has an error."""
+    found = []
+    for ladder in study.ladders:
+        finite = [dt for dt, error in ladder.completed if math.isfinite(error)]
+        without = [dt for dt, error in ladder.completed if not math.isfinite(error) and finite and dt < max(finite)]
+        if without and not ladder.left_out:
+            steps = counted(len(without), "smaller time step", "smaller time steps")
+            found.append(f"{ladder.engine} has an error at {in_ms(max(finite))}, and none at {steps} down to {in_ms(min(without))}.")
+    return found
 
 
 def _recommendation(study: TradeOff, tolerance: float) -> str:
@@ -130,24 +143,31 @@ def _recommendation(study: TradeOff, tolerance: float) -> str:
         error = f"{formatted(nearest.error)}{unit}"
         if nearest.error <= tolerance:
             none = "no tested configuration is within this tolerance at its time step and at all smaller ones"
-            outcome = f"{none}; {_named(nearest)} has an error of {error}, but a larger one at a smaller time step"
+            larger = "a larger one" if any(value > tolerance for dt, value in ladder.completed if dt < nearest.dt) else "none"
+            outcome = f"{none}; {_named(nearest)} has an error of {error}, but {larger} at a smaller time step"
         else:
             outcome = f"no tested configuration reaches this tolerance; the most accurate is {_named(nearest)} with an error of {error}"
         tried = f"With this engine, no time step below {in_ms(ladder.steps[-1][0])} was tried"
         return f"{goal}: {outcome}. {tried}, because {_reason(ladder)}."
     sentence, ratio = f"{goal}: {_named(advice.best)}, {duration(advice.best.typical_cost)} per simulated second", advice.ratio
     if advice.next_best is None:
-        sentence += "; no other engine reaches this tolerance." if len(study.ladders) > 1 else "."
+        others = {point.engine for point in study.points} - {advice.best.engine}
+        sentence += "; no other engine that was compared reaches this tolerance." if others else "."
     elif not advice.level:
-        sentence += f"; the next best, {_named(advice.next_best)}, takes {ratio:.1f} times as long."
+        sentence += f"; the next best, {_named(advice.next_best)}, takes {_times(ratio)} as long."
     else:
-        less = f"{ratio:.1f} times as long, but less time in a quarter of the rounds"
+        less = f"{_times(ratio)} as long, but less time in a quarter of the rounds"
         sentence += f"; {_named(advice.next_best)} takes {less if ratio >= LEVEL else f'about as long ({ratio:.2f} times)'}."
     for size in study.worlds:
         if batched := study.best_in_batch(tolerance, size):
             cost = duration(batched.costs_per_world[size])
             sentence += f" In a batch of {size}, the cheapest is {_named(batched)}: {cost} per world and simulated second."
     return sentence
+
+
+def _times(ratio: float) -> str:
+    """A ratio of costs with a decimal, or with two digits if it is large."""
+    return f"{ratio:.1f} times" if ratio < 10.0 else f"{rounded(ratio, 2)} times"
 
 
 def _timings(study: TradeOff) -> list[str]:

@@ -31,7 +31,8 @@ def made(*points):
 
 def found_with(points):
     points = tuple(points)
-    ladders = [Ladder(name, (), "budget", "") for name in dict.fromkeys(point.engine for point in points)]
+    names = dict.fromkeys(point.engine for point in points)
+    ladders = [Ladder(name, tuple((point.dt, point.error) for point in points if point.engine == name), "budget", "") for name in names]
     return TradeOff(SPIN, "orientation_error", points, tuple(ladders))
 
 
@@ -86,6 +87,22 @@ def test_coarse_step_is_not_recommended_if_a_finer_one_exceeds_the_tolerance():
     """Its error is small by chance, where it crosses 0."""
     found = made(("a", 0.4, 1e-5, [1, 1, 1]), ("a", 0.2, 1e-2, [2, 2, 2]), ("a", 0.1, 1e-4, [4, 4, 4]))
     assert found.recommendation(1e-3).best.dt == 0.1
+
+
+@pytest.mark.parametrize(("ended", "recommended"), [("budget", None), ("failed", 0.4)])
+def test_step_is_recommended_only_if_finer_ones_have_errors(ended, recommended):
+    """Unless the process failed at the last one, where it may have exceeded its time."""
+    [point] = made(("a", 0.4, 1e-5, [1, 1, 1])).points
+    advice = TradeOff(SPIN, "orientation_error", (point,), (Ladder("a", ((0.4, 1e-5), (0.2, np.nan)), ended, ""),)).recommendation(1e-3)
+    assert (advice and advice.best.dt) == recommended
+
+
+def test_engine_whose_small_error_does_not_fall_is_compared():
+    """An error of 1e-5 rad at all time steps is within 1e-3 rad; one of 0.1 rad is that of another motion."""
+    tried = [(0.1 / 2**number, [1e-5, 1e-5]) for number in range(8)]
+    assert errors._left_out(SPIN, tried, "orientation_error", "") == ""
+    large = [(dt, [1e-5, 0.1]) for dt, _ in tried]
+    assert errors._left_out(SPIN, large, "orientation_error", "").startswith("no convergence observed: orientation error is 0.1 to 0.1 rad")
 
 
 def test_recommendation_is_on_the_pareto_front_if_a_finer_step_took_less_time():

@@ -222,6 +222,29 @@ def test_speed_cut_in_the_first_step_is_a_clamp():
     assert clamped(*braked) == []
 
 
+def turning(spins):
+    states = np.zeros((len(spins), 13))
+    states[:, 6], states[:, 10:13] = 1.0, spins
+    return Trajectory.from_states(DT * np.arange(len(spins), dtype=float), states)
+
+
+@pytest.mark.parametrize(
+    ("reduced", "clamp"),
+    [
+        (lambda spins: np.clip(spins, -30.0, 30.0), 30.0),
+        (lambda spins: spins * np.minimum(1.0, 30.0 / np.linalg.norm(spins, axis=1, keepdims=True)), 30.0),
+    ],
+    ids=["components", "length"],
+)
+@pytest.mark.parametrize("size", [20.0, 45.0, 400.0])
+def test_clamp_of_components_and_of_the_length_have_their_values(reduced, clamp, size):
+    """Whether one component of a tumbling body is clamped or all three, whose length is then 52 rad/s."""
+    t = np.linspace(0.0, 8.0, 400)[:, np.newaxis]
+    spins = size * (np.array([0.9, 0.6, -1.0]) + np.array([0.2, 1.1, 0.4]) * np.sin(t * [1.3, 2.1, 1.7] + [0.3, 1.0, 2.0]))
+    motions = [turning(np.concatenate([share * spins[:1], reduced(share * spins[1:])])) for share in (1.0, 1.07)]
+    assert [one.size for one in clamped(*motions)] == pytest.approx([clamp])
+
+
 # Planted faults.
 
 

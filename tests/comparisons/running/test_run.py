@@ -10,8 +10,10 @@ from support.scenes import standing, with_few_members
 
 import dropspin as ds
 from dropspin import scenarios
+from dropspin.comparisons.engines.mujoco_engine import MuJoCo
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.table import COLUMNS
+from dropspin.comparisons.running.entries import engine_entries
 from dropspin.scenarios import DropspinError, SceneError
 
 BALL = ds.load("drop-ball")
@@ -244,6 +246,15 @@ def test_request_is_checked_before_anything_runs():
     )
     with pytest.raises(SceneError, match=r"^scene\['expect'\]\[0\]\['metric'\]: got 'energy_eror'.*Did you mean 'energy_error'"):
         ds.run([typo], ["wang"])
+
+
+def test_two_engines_of_one_name_are_refused_by_studies_too():
+    """Such as two versions of an adapter: the results of one would take the place of the other's. The same engine twice counts once."""
+    other = type("Other", (made.Exact,), {})
+    both = r"support\.engines:Exact and .*:Other both have the name exact"
+    with pytest.raises(DropspinError, match=f"engines: {both}; give one of them another name"):
+        engine_entries([made.Exact(), other()])
+    assert [entry.label for entry in engine_entries(["mujoco", MuJoCo(), "mujoco[integrator=euler]"])] == ["mujoco"]
 
 
 @pytest.mark.extended

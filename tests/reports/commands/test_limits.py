@@ -54,7 +54,7 @@ def test_engine_that_is_not_accurate_at_the_nominal_step_is_tried_at_smaller_one
         (["--within", "nan"], "nan is not a finite number"),
         (["--pair", "spin,mass"], "No such option"),
         (["--time-limit", "nan"], "is not a finite number"),
-        (["spin-principal"], "two scenes have the same name, which is that of the file; rename one of the files."),
+        (["spin-principal"], "a scene is given twice, or two files have the same name; give each scene once, or rename a file."),
     ],
 )
 def test_bad_input_is_refused(asked, message, tmp_path):
@@ -62,3 +62,10 @@ def test_bad_input_is_refused(asked, message, tmp_path):
     assert done.returncode == 2
     assert message in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_scene_without_the_axis_is_left_out_and_named(tmp_path):
+    done = dropspin("limits", "spin-principal", "drop-ball", "--axis", "height", "-e", "wang", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "Left out: spin-principal, it has no axis height." in done.stdout
+    assert "Left out: spin-principal, it has no axis height." in next(tmp_path.rglob("limits.md")).read_text()

@@ -22,6 +22,7 @@ from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Not
 from dropspin.comparisons.conformance.probes import DT, accepted_scene, recorded
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.faults.mistakes import NOT_INVERTED, NOT_ROTATED, ROTATED_BACK, SQUARE
+from dropspin.comparisons.faults.parameters import FAULT_MODELS
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.running.recording import Breakdown, record, try_record
 from dropspin.scenarios import Scenario, Trajectory
@@ -133,12 +134,16 @@ def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:
 
     if contact.approach[1] >= 0.0:
         return None
-    frictionless = scene.floor.model_copy(update={"friction": "none"})  # its omission is a fault of parameters
-    floors, of_body = (scene.floor, frictionless), (before, contact.point, contact.mass, contact.inertia)
+    frictionless = scene.floor.model_copy(update={"friction": "none"})
+    # Other coefficients are faults of parameters, which the probes name.
+    faulty = [fault.simulated(scene).floor for fault in FAULT_MODELS if fault.about == "friction"]
+    others = [floor for floor in faulty if floor and not any(isinstance(one.friction, str) for one in (floor, scene.floor))]
+    floors, of_body = (scene.floor, frictionless, *others), (before, contact.point, contact.mass, contact.inertia)
     laws = [law for law in LAWS if any(explains(velocities_after(*of_body, floor, law)) for floor in floors)]
     if laws:
         return OF_NOTE if laws == ["note"] and scene.floor == frictionless else None
-    dead = [floor.model_copy(update={"restitution": 0.0}) for floor in floors]  # as when the floor supports a body from the first step on
+    # As when the floor supports a body from the first step on.
+    dead = [floor.model_copy(update={"restitution": 0.0}) for floor in (scene.floor, frictionless)]
     if any(explains(velocities_after(*of_body, floor, law), APART * CLOSE) for floor, law in product(dead, LAWS)):
         return None
     return next((message for message, predicted in _predictions(contact) if explains(predicted)), None)

@@ -21,6 +21,7 @@ from dropspin.comparisons.conformance.impacts import (
     explain_impact,
     turning_impulse,
 )
+from dropspin.comparisons.conformance.offset import off_centre
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
 from dropspin.comparisons.conformance.probes import DT, PROBES, Probe, differences
 from dropspin.comparisons.engines.base import Engine, KnownLimitation
@@ -49,6 +50,7 @@ ALONG = 0.1
 """Change of the direction of an angular momentum, over the fall of its size, from which damping is not the only explanation."""
 ELSEWHERE = 0.1
 """Change of angular momentum about the contact point, over M r v, from which it is stated."""
+SEVERAL = 2
 TURNED = math.radians(1.0)
 """Angle from which the direction of friction is stated to be wrong."""
 
@@ -154,8 +156,13 @@ def _has_pairs(probe: Probe) -> bool:
 
 
 def _best(candidates: Iterable[Fault], probes: Iterable[Probe], motion_of: Callable[[Probe], Array | None]) -> Fault | None:
-    """The fault that gives the engine's states of the most probes, without those that change a probe in which the engine is right."""
+    """The fault that gives the engine's states of the most probes.
+
+    Without those that change a probe in which the engine is right, and those that explain no other probe and give other states than the
+    engine's in several.
+    """
     explained = dict.fromkeys(candidates, 0)
+    contradicted = dict.fromkeys(explained, 0)
     for probe in probes:
         exact, motions = probe.exact, _motions(probe, tuple(explained))
         changed = {fault: states for fault, states in motions.items() if probe.off(states, exact) > 1.0}
@@ -167,7 +174,10 @@ def _best(candidates: Iterable[Fault], probes: Iterable[Probe], motion_of: Calla
                 explained[fault] += 1
             elif probe.off(of_engine, exact) <= 1.0:
                 del explained[fault]
-    return max(explained, key=explained.__getitem__, default=None)
+            else:
+                contradicted[fault] += 1
+    likely = [fault for fault, probes_of_it in explained.items() if probes_of_it or contradicted[fault] < SEVERAL]
+    return max(likely, key=explained.__getitem__, default=None)
 
 
 @cache
@@ -195,6 +205,9 @@ def symptoms(probe: Probe, motion: Trajectory) -> Iterator[str]:
         return
     if probe.scene.floor is not None:
         yield from _of_first_contact(probe, Comparison.with_truth(probe.scene, motion, exact_solution(probe.scene)))
+    elif off := off_centre(probe.scene, motion, exact_solution(probe.scene)(motion.t).position):
+        yield off
+        return
     elif not np.any(rows[-1, RATES]) and np.any(exact[-1, RATES]):
         yield "the body stops: the engine puts it to sleep"
         return

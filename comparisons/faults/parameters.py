@@ -11,7 +11,7 @@ from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box, Ellipsoid
 from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.model import Gravity
-from dropspin.scenarios.state import Array
+from dropspin.scenarios.state import UP, Array
 from dropspin.scenarios.variations import with_values
 
 ORDERS = {order: ", ".join("xyz"[axis] for axis in order) for order in permutations(range(3)) if order != (0, 1, 2)}
@@ -91,6 +91,8 @@ PARAMETERS: dict[str, dict[str, Simulated]] = {
         "gravity is omitted": _gravity(lambda g, _: 0.0 * g),
         "gravity has the opposite sign; the scene gives an acceleration, y up": _gravity(lambda g, _: -g),
         "gravity is 9.81 m/s² along -y for every scene": _gravity(lambda g, _: 9.81 * DOWN),
+        "gravity is 9.81 m/s² along -y for every scene that has gravity": _gravity(lambda g, _: 9.81 * DOWN * g.any()),
+        "gravity acts along y only; it is a vector": _gravity(lambda g, _: g * UP),
         "gravity is 9.81 m/s² along -z for every scene; y is up": _gravity(lambda g, _: 9.81 * BACK),
         "gravity acts along -z; y is up": _gravity(lambda g, _: np.linalg.norm(g) * BACK),
         "gravity acts along -y with the scene's magnitude; it is a vector": _gravity(lambda g, _: np.linalg.norm(g) * DOWN),
@@ -112,8 +114,8 @@ PARAMETERS: dict[str, dict[str, Simulated]] = {
         "angular velocity stays constant, as without the gyroscopic term or with the inertia of a ball": _as_a_ball,
         **{f"the moments of inertia appear to be permuted to ({named})": _permuted_moments(order) for order, named in ORDERS.items()},
         "products of inertia are omitted: the body's own axes are not principal axes": _scaled_inertia(lambda mass: 1.0),
-        "inertia is twice as large": _scaled_inertia(lambda mass: 2.0),
-        "inertia is half as large": _scaled_inertia(lambda mass: 0.5),
+        "inertia is twice as large, relative to the mass": _scaled_inertia(lambda mass: 2.0),
+        "inertia is half as large, relative to the mass": _scaled_inertia(lambda mass: 0.5),
         "inertia is multiplied by the mass": _scaled_inertia(lambda mass: mass),
         "inertia is divided by the mass": _scaled_inertia(lambda mass: 1.0 / mass),
         "inertia is that of the solid shape for every scene": changed_table("body", inertia="solid"),

@@ -37,6 +37,8 @@ engine does not run the transformed scene, or breaks down in it.
 
 STEP_MULTIPLE = 1000.0
 """Rounding errors of a single time step, in eps of the scene's sizes and speeds, which some engines make in their transformations."""
+SUB_STEPS = 64
+"""The most sub-steps of a time step in which an engine may round a position."""
 BY_CHANCE = 3.0
 """Factor on the largest effect of a few perturbations, if it is so large that it is due to chance."""
 
@@ -78,8 +80,19 @@ def not_run(none: Finding, broken: Breakdown) -> Finding:
     return replace(none, reason=broken.reason, verdict=broken.verdict)
 
 
-def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Effects | None, precision: type) -> Finding:
-    """A finding with its status; where rounding has no effect, the motions of each pair must be equal bit for bit."""
+def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Effects | None, precision: type, away: float = 0.0) -> Finding:
+    """A finding with its status; where rounding has no effect, the motions of each pair must be equal bit for bit.
+
+    Args:
+        none: The finding without a status.
+        scene: The scene.
+        dt: Time step [s].
+        pairs: The motions that should be equal.
+        effects: The function that measures effects of rounding; None if it has none.
+        precision: Of the engine's states.
+        away: Distance of the body from the origin in one of the motions, over its size. An engine with sub-steps rounds its position more
+            often than once in a step.
+    """
     of_pairs = [differences(scene, *pair) for pair in pairs]
     difference: Array = np.max(of_pairs, axis=0)
     largest, steps = float(difference.max()), np.arange(len(difference), dtype=float)
@@ -97,6 +110,8 @@ def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Eff
     first = int(beyond[0])
     # What perturbations explain does not count, even if it is large.
     unexplained = float(difference[beyond].max())
+    if unexplained > MATTERS and (difference <= allowed + 0.5 * eps * away * SUB_STEPS * steps).all():
+        return replace(none, status="rounding", difference=largest)
     status: Status = "nearly kept" if unexplained <= MATTERS else "lost"
     motions = pairs[int(np.argmax([values.max() for values in of_pairs]))] if status == "lost" else None
     return replace(none, status=status, difference=unexplained, step=first, time=first * dt, motions=motions)

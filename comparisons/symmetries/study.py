@@ -34,6 +34,8 @@ FASTER = (1.001, 1.002)
 If the engine mixes scenes, the other numbers differ by as much.
 """
 
+NOT_REPEATED = "the engine does not repeat its own motion, so that a difference from another one says nothing of a symmetry"
+
 
 def symmetries(
     scenes: SceneLike | Iterable[SceneLike] = (),
@@ -120,14 +122,20 @@ def findings_of(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, nam
         names: Names of symmetries, and of ways to repeat the run.
     """
     applicable = [name for name in names if name not in SYMMETRIES or SYMMETRIES[name].applies(scene)]
-    return [_finding(entry, scene, dt, rows, name) for name in applicable]
+    found = [_finding(entry, scene, dt, rows, name) for name in applicable]
+    if not any(finding.symmetry == AGAIN and finding.status == "lost" for finding in found):
+        return found
+    unknown = Finding(scene.name, entry.label, "", "not run", reason=NOT_REPEATED)
+    return [replace(unknown, symmetry=finding.symmetry) if finding.symmetry in SYMMETRIES else finding for finding in found]
 
 
 def _finding(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: str) -> Finding:
     none = Finding(scene.name, entry.label, name, "not run")
     try:
         pairs, effects = _pairs(entry, scene, dt, rows, name)
-        return judged(none, scene, dt, pairs, effects, entry.adapter.precision)
+        there = SYMMETRIES[name].transformed(scene) if name in SYMMETRIES else scene
+        away = float(np.linalg.norm(there.start.position)) / there.body.size
+        return judged(none, scene, dt, pairs, effects, entry.adapter.precision, away)
     except DropspinError as error:  # the transformed scene is no valid scene
         return not_run(none, Breakdown("declined", str(error)))
     except Exception as error:  # an engine is somebody else's code

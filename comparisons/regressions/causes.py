@@ -88,8 +88,11 @@ def causes(results: Results, engine: str) -> Causes:
     for parameter in PARAMETERS:
         sizes = [size for size in _sizes(results.scenes[str(narrowest)], parameter, leading, dt) if holds(_with(parameter, size))]
         parameters += [WrongParameter(parameter, sizes[0], len(sizes) == 1)] if sizes else []
-    faults = [fault for fault in FAULT_MODELS if fault.about != "start" and holds(fault)]
-    return Causes(parameters, faults)
+    faults: dict[object, FaultModel] = {}  # the first one of those that are the same in all of these scenes
+    for fault in FAULT_MODELS:
+        if fault.about != "start" and holds(fault):
+            faults.setdefault((fault.reported, *(fault.simulated(scene) for scene, _ in scenes)), fault)
+    return Causes(parameters, list(faults.values()))
 
 
 def _sizes(scene: Scenario, parameter: Parameter, failed: pd.DataFrame, dt: float) -> Iterator[float]:

@@ -391,6 +391,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     for *cells, message in lines:
         terminalreporter.write_line("  ".join([*map(format, cells, layout), message]))
     runs = config.stash[RUNS]
-    if runs.baseline and not any(row["kind"] == "baseline" for by_key in judged.values() for row in by_key.values()):
+    every = [row for by_key in judged.values() for row in by_key.values()]
+    if runs.baseline and not any(row["kind"] == "baseline" or row["verdict"] in STOPPED for row in every):
         terminalreporter.write_line(f"{runs.baseline} has no accepted results of these runs; no results were compared with it.")
     terminalreporter.write_line(f"Reports: {os.path.relpath(runs.folder, runs.root)}/*")

@@ -48,6 +48,8 @@ class Result:
 
 BOUND = re.compile(r"([<>≤]) (.+)")
 TOLERANCE = "±"
+ROUNDING = 1e-12
+"""Relative difference up to which a value equals a bound."""
 ABSENT = "–"
 """The text of a value that a source does not have."""
 SHOWN = 6
@@ -59,7 +61,7 @@ class Agreement(NamedTuple):
 
     Attributes:
         here: The value, to the digits of the source.
-        difference: The value less the printed one; NaN for a bound.
+        difference: The value less the printed one, or less the bound.
         agrees: Whether the digits are equal, or the value is within the bound or the tolerance that the source states.
     """
 
@@ -84,12 +86,13 @@ def agreement(printed: str, value: float, significant: int = 0) -> Agreement:
     shown = f"{value:.{SHOWN}g}"
     if bound := BOUND.fullmatch(printed):
         limit = float(bound[2])
-        return Agreement(shown, math.nan, {"<": value < limit, ">": value > limit, "≤": value <= limit}[bound[1]])
+        at_most = value <= limit or math.isclose(value, limit, rel_tol=ROUNDING)
+        return Agreement(shown, value - limit, {"<": value < limit, ">": value > limit, "≤": at_most}[bound[1]])
     if TOLERANCE in printed:
         expected, tolerance = map(float, printed.split(TOLERANCE))
         return Agreement(shown, value - expected, abs(value - expected) <= tolerance)
     here = f"{value:.{significant}g}" if significant else _rounded(printed, value)
-    return Agreement(here, value - float(printed), here == printed)
+    return Agreement(here, value - float(printed), Decimal(here) == Decimal(printed))
 
 
 def with_value(result: Result, value: float | Breakdown, why_not: str, significant: int = 0) -> Result:

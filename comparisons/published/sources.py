@@ -3,18 +3,31 @@
 The files have numbers and names only; every description is dropspin's own.
 """
 
+import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
+from dropspin.comparisons.published.results import ABSENT, BOUND, TOLERANCE
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.loading import from_mapping, read_toml
 from dropspin.scenarios.tables import Table
+from dropspin.scenarios.validation import validated
 
 DATA = Path(__file__).parent / "data"
+NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
+
+
+def verify_printed(printed: str) -> str:
+    """Raise `ValueError` unless digits are those of a number, a bound, a number with a tolerance, or absent."""
+    bound = BOUND.fullmatch(printed)
+    numbers = [bound[2]] if bound else printed.split(TOLERANCE)
+    if printed != ABSENT and not (len(numbers) <= 2 and all(map(NUMBER.fullmatch, numbers))):
+        raise ValueError("must be a number such as 3.75 or 5e-3, a bound such as < 1.01, a tolerance such as 0.25±0.0025, or –")
+    return printed
 
 
 class Case(Table):
@@ -29,7 +42,7 @@ class Case(Table):
 
     case: str
     dt: float
-    printed: tuple[str, ...]
+    printed: tuple[Annotated[str, AfterValidator(verify_printed)], ...]
 
 
 class Group(Table):
@@ -108,5 +121,5 @@ def sources(names: Iterable[str] = ()) -> list[Source]:
     known, names = source_names(), list(dict.fromkeys(names))
     chosen = names or known
     verify_known("source", chosen, known)
-    loaded = [Source.model_validate({"name": name, **read_toml(DATA / f"{name}.toml", name)}) for name in chosen]
+    loaded = [validated(Source, f"{name}.toml", {"name": name, **read_toml(DATA / f"{name}.toml", name)}) for name in chosen]
     return loaded if names else [source for source in loaded if not source.data]

@@ -12,10 +12,13 @@ from dropspin.reports.commands.options import BASELINE, as_json, summary_option,
 @click.argument("run", metavar="RUN")
 @click.option("--baseline", metavar="FILE", help=f"The baseline. [default: {BASELINE}, which dropspin accept writes, if it exists]")
 @click.option("--no-baseline", is_flag=True, help=f"Check the expectations of the scenes only, even if there is a {BASELINE}.")
+@click.option("--complete", is_flag=True, help="End with exit code 2 if the run does not cover every accepted result.")
 @click.option("--junit", metavar="FILE", help="Write a test case for every check as JUnit XML, the format that CI servers read.")
 @summary_option
 @as_json
-def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str | None, summary: str | None, json_output: bool) -> int:
+def check_command(
+    run: str, baseline: str | None, no_baseline: bool, complete: bool, junit: str | None, summary: str | None, json_output: bool
+) -> int:
     """Check a run against the expectations of its scenes, and against the accepted results of a baseline.
 
     RUN is the folder that dropspin run -o wrote. The output says which baseline was used.
@@ -35,10 +38,14 @@ def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str 
 
     if baseline is not None and no_baseline:
         raise click.UsageError("--baseline names a baseline and --no-baseline leaves it out; give only one of them.")
+    if no_baseline and complete:
+        raise click.UsageError("--complete compares with a baseline and --no-baseline leaves it out; give only one of them.")
     if baseline is None and not no_baseline and os.path.lexists(BASELINE):
         baseline = BASELINE
     results = load_results(Path(run), arrays=False)
     accepted = None if baseline is None else load_baseline(baseline)
+    if complete and accepted is None:
+        raise click.UsageError(f"--complete needs a baseline, and there is no {BASELINE}; give --baseline.")
     try:
         checked = with_explaining_settings(check(results, accepted), accepted, imports=False)
     except DropspinError as error:
@@ -49,4 +56,6 @@ def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str 
     if summary is not None:
         write_text(summary, markdown(document, level=2), append=True)
     print_json_or(json_output, checked.results.table.to_dict("records"), document)
+    if complete and len(checked.not_run):
+        raise DropspinError(f"{baseline}: {story.not_covered(checked)}. Run them, or leave out --complete.")
     return checked.results.exit_code()

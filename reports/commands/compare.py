@@ -16,7 +16,8 @@ def compare_command(old: str, new: str, summary: str | None, json_output: bool) 
     """Show which results changed between two runs, and the cause: the engine, its settings, dropspin, or the machine.
 
     OLD and NEW are folders that dropspin run -o wrote, on one machine or on two. For a folder named history, write ./history, because
-    history is a command. Changes of speed, and whether motions are equal bit for bit in both runs, do not affect the exit code.
+    history is a command. Scenes and engines of one run alone, scenes that differ, changes of speed, and whether motions are equal bit
+    for bit in both runs do not affect the exit code.
 
     Exit code: 0 nothing is worse, 1 a result is worse, moved or gone, 2 bad input.
     """

@@ -51,6 +51,8 @@ def _load_runs(places: tuple[str, ...]) -> "dict[str, Results]":
     for place in places:
         path = Path(place)
         here = [path] if (path / "run.json").is_file() else sorted(file.parent for file in path.glob("*/run.json"))
+        if lost := [table.parent for table in sorted(path.glob("*/results.parquet")) if not (table.parent / "run.json").is_file()]:
+            raise DropspinError(f"{lost[0]}: has results, and no run.json; it is not a whole run. Remove it, or run it again.")
         if not here:
             raise DropspinError(
                 f"{place}: neither a run nor a folder of runs; give folders that dropspin run -o wrote, or a folder of them."

@@ -17,6 +17,8 @@ from dropspin.reports.stories.findings import counts, verdict_sentence
 from dropspin.reports.stories.numbers import capitalized, failing
 from dropspin.scenarios.text import counted
 
+MOST_MISSING = 5
+"""The most scenes that are listed as not covered."""
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
 
 
@@ -65,9 +67,7 @@ def sentences(checked: Checked, run: str, baseline: str | None) -> list[str]:
         if count := int(changes.get(change, 0)):
             notes.append(f"{counted(count, 'result is', 'results are')} {words}.")
     if len(checked.not_run):
-        pairs = len(checked.not_run.drop_duplicates(["scene", "engine"]))
-        are = counted(len(checked.not_run), "accepted result is", "accepted results are")
-        notes.append(f"{are} not covered by this run ({counted(pairs, 'scene–engine pair')}).")
+        notes.append(f"{not_covered(checked)}.")
     if known:
         notes.append(f"{counted(known, 'known failure is', 'known failures are')} not counted as failed.")
     acceptable = (~(broke_down(failed_rows, checked.results) & (failed_rows["metric"] == ""))).any()
@@ -75,6 +75,14 @@ def sentences(checked: Checked, run: str, baseline: str | None) -> list[str]:
         command = shlex.join(["dropspin", "accept", run, "--baseline", baseline, "--reason"])
         notes.append(f'If the changes are intended: {command} "…"')
     return [*notes, _verdict(checked, failed_rows, verdict)]
+
+
+def not_covered(checked: Checked) -> str:
+    """The number of accepted results that a run does not cover, and of which scenes and engines they are."""
+    are, pairs = counted(len(checked.not_run), "accepted result is", "accepted results are"), checked.not_run.groupby("scene")["engine"]
+    missing = [f"{scene} with {', '.join(dict.fromkeys(engines))}" for scene, engines in pairs]
+    more = [f"{len(missing) - MOST_MISSING:,} other scenes"] if len(missing) > MOST_MISSING + 1 else missing[MOST_MISSING:]
+    return f"{are} not covered by this run: {'; '.join(missing[:MOST_MISSING] + more)}"
 
 
 def _verdict(checked: Checked, failed_rows: pd.DataFrame, verdict: str) -> str:

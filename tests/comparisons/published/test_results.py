@@ -5,6 +5,9 @@ import math
 import pytest
 
 from dropspin.comparisons.published.results import agreement
+from dropspin.comparisons.published.sources import Case
+from dropspin.scenarios import DropspinError
+from dropspin.scenarios.validation import validated
 
 
 @pytest.mark.parametrize(
@@ -16,12 +19,14 @@ from dropspin.comparisons.published.results import agreement
         ("5e-3", 0.0047645, "5e-3"),
         ("1.86413e-06", 1.864129e-6, "1.86413e-6"),
         ("0.5600215", 0.5600215, "0.5600215"),
+        ("37475e-4", 3.74750001, "3.7475e0"),
     ],
 )
 def test_a_value_is_rounded_to_the_printed_digits(printed, value, here):
     found = agreement(printed, value)
     assert found.here == here
     assert found.difference == value - float(printed)
+    assert found.agrees is (abs(float(here) - float(printed)) < 1e-15)
 
 
 @pytest.mark.parametrize(
@@ -45,6 +50,7 @@ def test_dropped_zeros_are_compared_too():
         ("< 1.01", 1.0099, 1.01),
         ("> 0.7", 0.7001, 0.7),
         ("≤ 1.8e-15", 1.8e-15, 1.81e-15),
+        ("≤ 3.7475", 3.7475 + 9e-15, 3.74751),
         ("0.25±0.0025", 0.24751, 0.2474),
         ("0.25±0.0025", 0.25249, 0.2526),
     ],
@@ -53,3 +59,9 @@ def test_bounds_and_tolerances_of_the_source(printed, inside, outside):
     assert agreement(printed, inside).agrees
     assert not agreement(printed, outside).agrees
     assert not agreement(printed, math.nan).agrees
+
+
+@pytest.mark.parametrize("printed", ["3,7475", "3.7475 m", "nan", "inf", "", "3.75±5%", "< x", "1±2±3", "0.25±inf"])
+def test_digits_that_are_no_number_are_refused(printed):
+    with pytest.raises(DropspinError, match=r"must be a number such as 3\.75 or 5e-3, a bound such as < 1\.01, a tolerance"):
+        validated(Case, "mine.toml", {"case": "a", "dt": 1e-3, "printed": [printed]})

@@ -69,6 +69,22 @@ def test_check_reads_by_default_the_baseline_that_accept_writes_by_default(repos
     assert (left_out.returncode, left_out.stdout) == (without.returncode, without.stdout)
 
 
+def test_accepted_results_that_a_run_does_not_cover_are_named(repository, tmp_path):
+    """A scene that was removed leaves the check without a failure, unless the check is to be complete."""
+    command = ("run", "drop-ball", "-e", ENGINE, "--dt", "0.008", "--dt", "0.004", "--dt", "0.002", "-o", tmp_path / "run")
+    dropspin(*command, cwd=repository)
+    done = dropspin("check", tmp_path / "run", *BASELINE, cwd=repository)
+    assert done.returncode == 0
+    words = r"\d+ accepted results are not covered by this run: spin-principal with my-engine\."
+    assert re.search(words, " ".join(done.stdout.split()))
+    complete = dropspin("check", tmp_path / "run", *BASELINE, "--complete", cwd=repository)
+    assert (complete.returncode, complete.stdout) == (2, done.stdout)
+    assert re.search(f"{words} Run them, or leave out --complete", complete.stderr)
+    assert dropspin("check", "out/good", *BASELINE, "--complete", cwd=repository).returncode == 0
+    without = dropspin("check", tmp_path / "run", "--complete", cwd=tmp_path)
+    assert (without.returncode, "--complete needs a baseline" in without.stderr) == (2, True)
+
+
 @pytest.mark.extended
 def test_run_that_the_default_baseline_does_not_cover_is_refused_with_the_remedy(repository, tmp_path):
     for extra, reason in ((), "none of the "), (("--quick",), "a quick run has too few starts"):

@@ -10,7 +10,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from dropspin.comparisons.diagnosis.loose_body import Changes, MassProperties
+from dropspin.comparisons.diagnosis.loose_body import Changes
+from dropspin.comparisons.diagnosis.mujoco_shapes import placed
 from dropspin.comparisons.diagnosis.source import option_setting, read_source
 from dropspin.comparisons.engines.mujoco_simulation import quiet
 from dropspin.scenarios import DropspinError
@@ -109,6 +110,22 @@ class MuJoCoFile:
         try:
             with quiet():
                 return placed(spec.compile()) if counted else None
+        except ValueError:
+            return None
+
+    @cached_property
+    def without_visual(self) -> tuple[Any, Any] | None:
+        """The model, with its data, if geometries that collide with nothing, and of which the file gives no mass, have none.
+
+        None without such geometries, or if a body is left without mass.
+        """
+        spec = self._spec.copy()
+        visual = [geom for geom in spec.geoms if not (geom.contype or geom.conaffinity or spec.pairs) and math.isnan(geom.mass)]
+        for geom in visual:
+            geom.mass = 0.0
+        try:
+            with quiet():
+                return placed(spec.compile()) if visual else None
         except ValueError:
             return None
 
@@ -261,13 +278,6 @@ class MuJoCoFile:
         return GeomSettings(**{name: plain(getattr(model, f"geom_{name}")[geom]) for name in names})
 
 
-def placed(model: Any) -> tuple[Any, Any]:
-    """A compiled model, and its data with the bodies where the file has them."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    return model, data
-
-
 def plain(value: Any) -> Any:
     """Numbers of a compiled model as a tuple, or as a number."""
     return tuple(value.tolist()) if np.ndim(value) else value.item()
@@ -280,19 +290,6 @@ def set_options(option: Any, compiled: Any, dt: float, changes: Changes) -> None
         setattr(option, name, ENUMERATIONS[value] if isinstance(value, str) else value)
     option.timestep = dt
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-
-
-def mass_properties(model: Any, data: Any, group: Sequence[int]) -> MassProperties | None:
-    """Those of a body and what is welded to it, in the frame of the body, the first of the group; None without mass."""
-    masses, origin, turn = model.body_mass[group], data.xpos[group[0]], data.xmat[group[0]].reshape(3, 3)
-    if not masses.sum() > 0.0:
-        return None
-    points = (data.xipos[group] - origin) @ turn
-    centre, inertia = np.average(points, axis=0, weights=masses), np.zeros((3, 3))
-    for mass, moments, axes, arm in zip(masses, model.body_inertia[group], data.ximat[group], points - centre, strict=True):
-        turned = turn.T @ axes.reshape(3, 3)
-        inertia += turned @ np.diag(moments) @ turned.T + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return MassProperties(float(masses.sum()), centre, inertia)
 
 
 @cache

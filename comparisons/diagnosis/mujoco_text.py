@@ -9,7 +9,8 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, digits
 from dropspin.comparisons.diagnosis.loose_body import MassProperties
-from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile, mass_properties
+from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile
+from dropspin.comparisons.diagnosis.mujoco_shapes import mass_properties
 from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
@@ -162,6 +163,7 @@ class BodyText:
                 made = made if wanted.any() else "0, with which MuJoCo simulates no body; measured with that of a uniform solid"
                 yield self._changed("inertia", f"{made}: moments {digits(has.tolist())} kg m²")
         yield from self._miscounted()
+        yield from self._visual()
         if condim and (
             unused := [name for name, (place, least, most) in FURTHER.items() if condim < least and self._friction(place) > most]
         ):
@@ -169,6 +171,9 @@ class BodyText:
             yield "friction", settings["friction"], f"used in part: {needed}, and condim is {condim}"
         if self._file.is_urdf:
             element = self.element
+            if element is not None and next(element.every("inertial"), None) is None:
+                made = f"missing: the mass is {in_force.mass:.4g} kg, that of its geometries at the default density"
+                yield "inertial", Setting("no inertial", element.file, element.line), made
             if self._file.model.body_weldid[self._head] == 0:
                 yield "base", Setting("the root link") if element is None else element.words, "welded to the world"
             for tag, value in IN_FORCE.items():
@@ -192,6 +197,21 @@ class BodyText:
             meshes = list(self._file.source.every("mesh"))
             made = f'counted as {has.mass:.4g} kg by default; its volume has {exact.mass:.4g} kg, which inertia="exact" gives'
             yield "mesh", meshes[0].words if meshes else Setting("a mesh"), made
+
+    def _visual(self) -> Iterator[tuple[str, Setting, str]]:
+        """Geometries that collide with nothing, and count in the mass by their density."""
+        if self._file.without_visual is None or self.element is None:
+            return
+        group = self._file.group(self._head)
+        has, least = (mass_properties(*compiled, group) for compiled in ((self._file.model, self._file.data), self._file.without_visual))
+        if has is not None and least is not None and has.mass - least.mass > NOTEWORTHY * has.mass:
+            model, own = self._file.model, [child for child in self.element.children if child.tag == "geom"]
+            of_body = np.flatnonzero(model.geom_bodyid == self._head)
+            visual = [
+                child for geom, child in zip(of_body, own, strict=False) if not (model.geom_contype[geom] or model.geom_conaffinity[geom])
+            ]
+            made = f"counted in the mass with {has.mass - least.mass:.4g} kg, by its density, although it collides with nothing"
+            yield "visual", visual[0].words if visual else Setting("a geometry"), made
 
     def _changed(self, name: str, made: str) -> tuple[str, Setting, str]:
         """A quantity that the compiler changes, with what is written, and the setting that changes it."""

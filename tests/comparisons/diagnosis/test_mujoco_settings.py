@@ -300,3 +300,17 @@ def test_a_body_that_trembles_on_an_undamped_contact_of_the_file_is_due_to_this_
     assert (answer.quantity, found.kind, found.settings) == ("drift speed", "setting", ("solref",))
     damped = undamped.replace("-1000 0", "-1000 -30")
     assert findings_of(body_of(tmp_path, FREE.format(damped), 'timestep="0.0002"'), rest) == []
+
+
+def test_mass_of_geometries_that_the_file_gives_no_mass_is_named(tmp_path):
+    """A box of 1.2 litres: beside one of 1 kg that collides, and as the only geometry of a link."""
+    visual = '<geom type="box" size=".1 .05 .03" mass="1"/><geom type="box" size=".1 .05 .03" contype="0" conaffinity="0"{}/>'
+    made = {}
+    for mass in ("", ' mass="0"'):
+        found = body_of(tmp_path, FREE.format(visual.format(mass))).facts.ignored
+        made[mass] = [(name, text) for name, _, text in found]
+    assert made[' mass="0"'] == []
+    assert made[""] == [("visual", "counted in the mass with 1.2 kg, by its density, although it collides with nothing")]
+    link = '<link name="b"><collision><geometry><box size="0.2 0.1 0.06"/></geometry></collision></link>'
+    found = body_of(tmp_path, f'<robot name="r">{link}</robot>', file="model.urdf").facts.ignored
+    assert "missing: the mass is 1.2 kg, that of its geometries at the default density" in [text for _, _, text in found]

@@ -50,7 +50,7 @@ def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | Non
             remedy = Remedy(
                 f"the centre of mass of a uniform solid, which is displaced by ({digits(off.tolist())}) m along the body's axes"
             )
-            finding = Finding("impossible", ("inertia",), (remedy,), "less for these moments, this mass and shape")
+            finding = Finding("impossible", ("centre",), (remedy,), "less for these moments, this mass and shape")
             yield Answer(
                 "inertia", "distance of the centre of mass from a solid's", "m", measured=float(np.linalg.norm(off)), findings=(finding,)
             )

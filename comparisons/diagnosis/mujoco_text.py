@@ -95,6 +95,7 @@ class BodyText:
             tensor = next(inertial.every("inertia"), None)  # of URDF
             names = ("diaginertia", "fullinertia", "mass")
             written["mass"] = [inertial.setting("mass") or next((one.words for one in inertial.every("mass")), None)]
+            written["centre"] = [inertial.setting("pos") or next((one.words for one in inertial.every("origin")), inertial.words)]
             written["inertia"] = [inertial.setting(name) for name in names] if tensor is None else [tensor.words]
         # Of several places, the first one counts.
         return found | {name: one for name, several in written.items() for one in reversed(several) if one} | overrides

@@ -221,6 +221,8 @@ class PyBulletBody(LooseBody):
         """The settings that matter, in the words of the file or as PyBullet's defaults."""
         link = self._model.links[self._name]
         written = {name: at for tag, attribute, name in WRITTEN for one in link.every(tag) if (at := one.setting(attribute))}
+        for inertial in link.every("inertial"):
+            written["centre"] = next((one.words for one in inertial.every("origin")), inertial.words)
         return {name: Setting(text) for name, text in DEFAULTS.items()} | written
 
     def _ignored(self, restitution: float) -> Sequence[Ignored]:

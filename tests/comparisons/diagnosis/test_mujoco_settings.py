@@ -73,6 +73,7 @@ def test_wrong_centre_of_mass_is_told_from_wrong_moments(tmp_path):
     [answer] = impossible(body)
     assert (answer.quantity, answer.measured) == ("distance of the centre of mass from a solid's", pytest.approx(0.03))
     assert "which is displaced by (0, 0, 0.03) m" in answer.findings[0].remedies[0].text
+    assert [str(body.facts.settings[name]) for name in answer.findings[0].settings] == ['pos="0 0 0" (model.xml, line 1)']
 
 
 def test_mass_and_inertia_that_the_compiler_changes_are_said(tmp_path):

@@ -40,7 +40,9 @@ CHECKS: dict[str, Callable[[Engine], str]] = {
 
 LEFT = ("failed", "crashed")
 """Outcomes that state left by other checks may cause."""
-AFTER_SIMILAR = "a scene gives other bits after one that differs from it in one quantity than alone: a simulation leaves state behind"
+OF_PROCESSES = 1e-6
+"""Relative difference that rounding may cause between two processes."""
+AFTER_SIMILAR = "a scene has another motion after one that differs from it in one quantity than alone: a simulation leaves state behind"
 AFTER_OTHERS = "this check fails after other checks, but not alone: a simulation leaves state behind"
 
 
@@ -89,7 +91,15 @@ def _result(processes: EngineProcesses, entry: EngineEntry, check: str, folder: 
 
 
 def _depends_on_earlier(processes: EngineProcesses, entry: EngineEntry) -> bool:
-    """Whether a scene gives other bits after one that differs from it in one quantity than as the first in a process."""
+    """Whether a scene has another motion after one that differs from it in one quantity than as the first in a process.
+
+    By more than the rounding in which two processes may differ, such as on a GPU; the quantity of the other scene would have a large effect.
+    """
+
+    def differ(first: list[Array] | Breakdown, after: Array) -> bool:
+        if isinstance(first, Breakdown):
+            return True
+        return not protocol.same(first[0], after) and protocol.relative_difference(first[0], after) > OF_PROCESSES
 
     def states(*which: int) -> list[Array] | Breakdown:
         processes.renew(entry)
@@ -99,7 +109,7 @@ def _depends_on_earlier(processes: EngineProcesses, entry: EngineEntry) -> bool:
     if isinstance(after, Breakdown):
         return False
     alone = [states(number) for number in range(len(after))]
-    return any(isinstance(first, Breakdown) or not protocol.same(first[0], other) for first, other in zip(alone, after, strict=True))
+    return any(map(differ, alone, after))
 
 
 def run_check(entry: EngineEntry, check: str, folder: str | None = None) -> CheckResult:

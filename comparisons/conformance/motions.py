@@ -22,7 +22,7 @@ from dropspin.comparisons.conformance.impacts import (
     turning_impulse,
 )
 from dropspin.comparisons.conformance.offset import off_centre
-from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
+from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted, digits_that_differ, instead
 from dropspin.comparisons.conformance.probes import DT, PROBES, Probe, differences
 from dropspin.comparisons.engines.base import Engine, KnownLimitation
 from dropspin.comparisons.faults.fault_model import FaultModel
@@ -215,7 +215,7 @@ def symptoms(probe: Probe, motion: Trajectory) -> Iterator[str]:
         yield from _of_flight(probe.scene, rows[-1], exact[-1])
     for (name, unit), error, allowed in zip(QUANTITIES, differences(rows[probe.rows], exact), probe.allowed, strict=True):
         if not error <= allowed:
-            yield f"{name} is off by {error:.{min(_digits(error, allowed), 4)}g} {unit} (allowed: {allowed:g} {unit})"
+            yield f"{name} is off by {error:.{min(digits_that_differ(error, allowed), 4)}g} {unit} (allowed: {allowed:g} {unit})"
 
 
 def _of_flight(scene: Scenario, end: Array, exact: Array) -> Iterator[str]:
@@ -235,7 +235,7 @@ def _of_flight(scene: Scenario, end: Array, exact: Array) -> Iterator[str]:
                 too_slow = ""  # damping lowers the energy too
             elif quantity == "angular momentum" and np.linalg.norm(got - right * final / expected) > ALONG * (expected - final):
                 too_slow = "damping, a clamp or a wrong gyroscopic term: "  # damping in proportion to the momentum does not turn it
-            yield f"{too_slow if final < expected else too_fast}the final {quantity} is {_instead(final, expected, unit)}"
+            yield f"{too_slow if final < expected else too_fast}the final {quantity} is {instead(final, expected, unit)}"
 
 
 def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
@@ -254,7 +254,7 @@ def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
         times, step = case.motion.t, 2.0 * case.dt
         impact = float(np.interp(case.impacts[0], case.exact.t, case.exact.position[:, 1]))
         if abs(height - impact) > allowed_position + step * abs(float(case.motion.velocity[before, 1])):
-            yield f"the first contact begins at a height of {_instead(height, impact, 'm')}"
+            yield f"the first contact begins at a height of {instead(height, impact, 'm')}"
             if not scene.body.is_ball:  # it touches elsewhere, so that the impulse at the exact contact point says nothing
                 return
         # The impact of the engine may be a step or two early or late; the next one is another.
@@ -270,7 +270,7 @@ def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
         sampled = Comparison(scene, case.exact, case.exact, case.impacts)
         wrong, right = (METRICS["restitution_error"].value_or_nan([compared]) for compared in (case, sampled))
         if abs(wrong - right) > CLEAR:
-            yield f"restitution is {_instead(scene.floor.restitution + wrong - right, scene.floor.restitution)}"
+            yield f"restitution is {instead(scene.floor.restitution + wrong - right, scene.floor.restitution)}"
     moment = METRICS["contact_momentum_error"]
     if moment.applies(scene, exact_solution(scene)) and (turned := moment.value_or_nan([case])) > ELSEWHERE:
         yield (
@@ -285,22 +285,7 @@ def _of_friction(change: Array, exact: Array) -> Iterator[str]:
     """The size of the friction impulse over the normal one, and its direction."""
     strength, expected = (float(np.linalg.norm(impulse[[0, 2]]) / impulse[1]) for impulse in (change, exact))
     if abs(strength - expected) > CLEAR:
-        yield f"the ratio of the friction impulse to the normal impulse is {_instead(strength, expected)}"
+        yield f"the ratio of the friction impulse to the normal impulse is {instead(strength, expected)}"
     angle = abs(math.remainder(math.atan2(change[0], change[2]) - math.atan2(exact[0], exact[2]), math.tau))
     if strength > CLEAR and expected > CLEAR and angle > TURNED:
         yield f"friction acts {rounded(math.degrees(angle), 2)}° from its exact direction"
-
-
-def _instead(got: float, expected: float, unit: str = "") -> str:
-    """Two numbers with so many digits that they differ, and the difference as a share of the expected one."""
-    value = f"{got:.{_digits(got, expected)}g}{f' {unit}' if unit else ''} instead of {rounded(expected, 6)}"
-    if expected == 0.0:
-        return value
-    if got * expected < 0.0:
-        return f"{value} (of the opposite sign)"
-    return f"{value} ({rounded(100.0 * abs(got / expected - 1.0), 2)} % too {'high' if abs(got) > abs(expected) else 'low'})"
-
-
-def _digits(got: float, expected: float) -> int:
-    """Significant digits in which two numbers differ."""
-    return 2 + max(0, math.ceil(math.log10(abs(expected / (got - expected))))) if expected and got != expected else 3

@@ -1,5 +1,6 @@
-"""The outcome of a conformance check, the exceptions by which a check ends early, and what an adapter raised as text."""
+"""The outcome of a conformance check, the exceptions by which a check ends early, and numbers and what an adapter raised as text."""
 
+import math
 import os
 import sys
 import traceback
@@ -8,6 +9,7 @@ from typing import Literal, NamedTuple
 from dropspin.comparisons.engines import exceptions
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.running.verification import BuildMismatch
+from dropspin.scenarios.text import rounded
 
 CheckOutcome = Literal["passed", "failed", "noted", "declined", "crashed", "timed_out"]
 """`noted` is a peculiarity of the engine: the adapter is right."""
@@ -56,3 +58,18 @@ def described(error: Exception, engine: Engine) -> str:
 def whole_traceback(error: Exception) -> str:
     """The traceback of an exception, or of its cause if it has one."""
     return "".join(traceback.format_exception(error.__cause__ or error))
+
+
+def instead(got: float, expected: float, unit: str = "") -> str:
+    """Two numbers with so many digits that they differ, and the difference as a share of the expected one."""
+    value = f"{got:.{digits_that_differ(got, expected)}g}{f' {unit}' if unit else ''} instead of {rounded(expected, 6)}"
+    if expected == 0.0:
+        return value
+    if got * expected < 0.0:
+        return f"{value} (of the opposite sign)"
+    return f"{value} ({rounded(100.0 * abs(got / expected - 1.0), 2)} % too {'high' if abs(got) > abs(expected) else 'low'})"
+
+
+def digits_that_differ(got: float, expected: float) -> int:
+    """Significant digits in which two numbers differ."""
+    return 2 + max(0, math.ceil(math.log10(abs(expected / (got - expected))))) if expected and got != expected else 3

@@ -93,7 +93,7 @@ def _result(processes: EngineProcesses, entry: EngineEntry, check: str, folder: 
 def _depends_on_earlier(processes: EngineProcesses, entry: EngineEntry) -> bool:
     """Whether a scene has another motion after one that differs from it in one quantity than as the first in a process.
 
-    By more than the rounding in which two processes may differ, such as on a GPU; the quantity of the other scene would have a large effect.
+    By more than the rounding in which two processes may differ, such as on a GPU; a quantity of another scene has a large effect.
     """
 
     def differ(first: list[Array] | Breakdown, after: Array) -> bool:

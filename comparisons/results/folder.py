@@ -9,6 +9,7 @@ import hashlib
 import os
 import re
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -16,6 +17,9 @@ from functools import partial
 from pathlib import Path
 
 from filelock import FileLock, Timeout
+
+if sys.platform != "win32":
+    import fcntl
 
 from dropspin.comparisons.results.interrupts import interrupts_deferred
 from dropspin.scenarios import DropspinError
@@ -174,15 +178,15 @@ def unfinished_folder(place: Path, name: str = "") -> Iterator[Path]:
 
 @contextmanager
 def one_at_a_time(path: str | Path) -> Iterator[None]:
-    """Let one process of a user at a time read, change and write a file; others wait. The lock is no file beside it."""
-    of_file = hashlib.sha256(os.fsencode(Path(path).resolve())).hexdigest()[:16]
-    lock = FileLock(Path(tempfile.gettempdir(), f"dropspin-{getattr(os, 'getuid', int)()}-{of_file}.lock"))
-    with suppress(NotImplementedError):  # a file system without locks
-        lock.acquire()
-    try:
+    """Let one process at a time read, change and write a file; others wait, where the system can lock the file's folder."""
+    place = Path(path).resolve().parent
+    with ExitStack() as at_end:
+        if sys.platform != "win32":
+            with suppress(OSError):  # a file system without locks, or a folder that this user cannot read
+                folder = os.open(next(parent for parent in (place, *place.parents) if parent.is_dir()), os.O_RDONLY)
+                at_end.callback(os.close, folder)
+                fcntl.flock(folder, fcntl.LOCK_EX)
         yield
-    finally:
-        lock.release()
 
 
 def is_unfinished(name: str) -> bool:

@@ -38,11 +38,12 @@ CHECKS: dict[str, Callable[[Engine], str]] = {
 }
 """By name; each returns what it found, and raises one of `OUTCOMES` otherwise."""
 
-LEFT = ("failed", "crashed")
+SUSPECT = ("failed", "crashed")
 """Outcomes that state left by other checks may cause."""
 OF_PROCESSES = 1e-6
 """Relative difference that rounding may cause between two processes."""
 AFTER_SIMILAR = "a scene has another motion after one that differs from it in one quantity than alone: a simulation leaves state behind"
+OF_PROCESS = "the same scene has another motion in another process: the engine is random, or depends on its process"
 AFTER_OTHERS = "this check fails after other checks, but not alone: a simulation leaves state behind"
 
 
@@ -74,12 +75,10 @@ def conform(
     with tempfile.TemporaryDirectory() as folder, EngineProcesses(resources) as processes:
         for check in checks or CHECKS:
             result = _result(processes, entry, check, folder)
-            if result.outcome in LEFT and results:
-                processes.renew(entry)
-                alone = _result(processes, entry, check, folder)
-                result = alone if alone.outcome in LEFT else CheckResult(check, "failed", f"{AFTER_OTHERS} ({result.message})")
-            if check == "repeats" and result.outcome == "passed" and _depends_on_earlier(processes, entry):
-                result = CheckResult(check, "failed", AFTER_SIMILAR)
+            if result.outcome in SUSPECT and results:
+                result = _alone(processes, entry, check, folder, result)
+            if check == "repeats" and result.outcome == "passed" and (why := _changed_by_similar(processes, entry)):
+                result = CheckResult(check, "failed", why)
             results.append(result)
             (on_result or ignore)(result)
     return results
@@ -90,26 +89,37 @@ def _result(processes: EngineProcesses, entry: EngineEntry, check: str, folder: 
     return CheckResult(check, cast(CheckOutcome, result.verdict), result.reason) if isinstance(result, Breakdown) else result
 
 
-def _depends_on_earlier(processes: EngineProcesses, entry: EngineEntry) -> bool:
-    """Whether a scene has another motion after one that differs from it in one quantity than as the first in a process.
+def _alone(processes: EngineProcesses, entry: EngineEntry, check: str, folder: str, after: CheckResult) -> CheckResult:
+    """The result of a check in a new process, or that state is left if it fails only after others; a random engine may pass once."""
+    processes.renew(entry)
+    for _ in range(2):
+        alone = _result(processes, entry, check, folder)
+        if alone.outcome not in ("passed", "noted", "declined"):
+            return alone
+    return CheckResult(check, "failed", f"{AFTER_OTHERS} ({after.message})")
+
+
+def _changed_by_similar(processes: EngineProcesses, entry: EngineEntry) -> str:
+    """A message if a scene has another motion after one that differs from it in one quantity than as the first in a process, else empty.
 
     By more than the rounding in which two processes may differ, such as on a GPU; a quantity of another scene has a large effect.
     """
 
-    def differ(first: list[Array] | Breakdown, after: Array) -> bool:
-        if isinstance(first, Breakdown):
-            return True
-        return not protocol.same(first[0], after) and protocol.relative_difference(first[0], after) > OF_PROCESSES
-
-    def states(*which: int) -> list[Array] | Breakdown:
+    def states(*which: int) -> list[Array | None] | Breakdown:
         processes.renew(entry)
         return processes.call(entry, protocol.states_of_variants, which)
 
+    def differ(alone: list[Array | None] | Breakdown, after: Array | None) -> bool:
+        if isinstance(alone, Breakdown) or alone[0] is None:  # which other checks state
+            return False
+        return after is None or not (protocol.same(alone[0], after) or protocol.relative_difference(alone[0], after) <= OF_PROCESSES)
+
     after = states()
     if isinstance(after, Breakdown):
-        return False
-    alone = [states(number) for number in range(len(after))]
-    return any(map(differ, alone, after))
+        return ""
+    if differ(states(0), after[0]):
+        return OF_PROCESS
+    return AFTER_SIMILAR if any(differ(states(number), after[number]) for number in range(1, len(after))) else ""
 
 
 def run_check(entry: EngineEntry, check: str, folder: str | None = None) -> CheckResult:

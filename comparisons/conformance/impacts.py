@@ -135,9 +135,9 @@ def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:
     if contact.approach[1] >= 0.0:
         return None
     frictionless = scene.floor.model_copy(update={"friction": "none"})
-    # Other coefficients are faults of parameters, which the probes name.
+    # Smaller coefficients are faults of parameters, which the probes name; with larger ones a body may stick, as with a mistake.
     faulty = [fault.simulated(scene).floor for fault in FAULT_MODELS if fault.about == "friction"]
-    others = [floor for floor in faulty if floor and not any(isinstance(one.friction, str) for one in (floor, scene.floor))]
+    others = [floor for floor in faulty if floor and 0.0 < floor.coefficient < scene.floor.coefficient < np.inf]
     floors, of_body = (scene.floor, frictionless, *others), (before, contact.point, contact.mass, contact.inertia)
     laws = [law for law in LAWS if any(explains(velocities_after(*of_body, floor, law)) for floor in floors)]
     if laws:
@@ -201,7 +201,7 @@ def _impulses(contact: Contact, response: Array) -> Iterator[tuple[str, Array]]:
 
 def turning_impulse(scene: Scenario, states: Array) -> str:
     """A message if a floor without friction turns a ball; `states`, shape (2, 13), are those before and after; empty if it does not."""
-    change = states[1] - states[0]
+    change = states[1] - states[0]  # of a ball that neither slides nor spins, so that only the normal impulse can turn it
     if scene.floor is None or scene.floor.friction != "none" or not scene.body.is_ball or change[VELOCITY][1] <= 0.0:
         return ""
     arm = float(np.linalg.norm(scene.body.inertia_tensor @ change[SPIN]) / (scene.body.mass * change[VELOCITY][1]))

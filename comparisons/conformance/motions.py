@@ -50,7 +50,8 @@ ALONG = 0.1
 """Change of the direction of an angular momentum, over the fall of its size, from which damping is not the only explanation."""
 ELSEWHERE = 0.1
 """Change of angular momentum about the contact point, over M r v, from which it is stated."""
-SEVERAL = 2
+CONTRADICTIONS = 2
+"""Number of probes in which another motion excludes a fault that explains none."""
 TURNED = math.radians(1.0)
 """Angle from which the direction of friction is stated to be wrong."""
 
@@ -158,7 +159,7 @@ def _has_pairs(probe: Probe) -> bool:
 def _best(candidates: Iterable[Fault], probes: Iterable[Probe], motion_of: Callable[[Probe], Array | None]) -> Fault | None:
     """The fault that gives the engine's states of the most probes.
 
-    Without those that change a probe in which the engine is right, and those that explain no other probe and give other states than the
+    A fault is left out if it changes a probe in which the engine is right, or if it explains no other probe and gives other states than the
     engine's in several.
     """
     explained = dict.fromkeys(candidates, 0)
@@ -176,7 +177,7 @@ def _best(candidates: Iterable[Fault], probes: Iterable[Probe], motion_of: Calla
                 del explained[fault]
             else:
                 contradicted[fault] += 1
-    likely = [fault for fault, probes_of_it in explained.items() if probes_of_it or contradicted[fault] < SEVERAL]
+    likely = [fault for fault, probes_of_it in explained.items() if probes_of_it or contradicted[fault] < CONTRADICTIONS]
     return max(likely, key=explained.__getitem__, default=None)
 
 

@@ -94,11 +94,11 @@ def check_time(engine: Engine) -> str:
 def _late(ticks: dict[float, Array]) -> float:
     """By how many steps rows are later than they should be.
 
-    0 if by other numbers for other steps, as states with a constant error are, or for later rows, as those of another acceleration are.
+    0 if by other numbers for other steps, as states with a constant error are, or for ever later rows, as those of another acceleration.
     """
     each = [np.arange(len(times)) - times for times in ticks.values()]
     late = [float(np.median(of_rows)) for of_rows in each]
-    is_constant = max(np.ptp(of_rows[1:]) for of_rows in each) <= LATE
+    is_constant = max(np.ptp(of_rows[len(of_rows) // 2 :]) for of_rows in each) <= LATE
     return late[0] if is_constant and np.ptp(late) <= LATE else 0.0
 
 

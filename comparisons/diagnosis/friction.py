@@ -18,6 +18,7 @@ LONGEST_SLIDE = 5.0  # m
 LONG_SLIDE = 0.25  # s, within which a body stops
 SHORT = 0.1
 """Relative error up to which a shorter slide says more of the time in which soft contacts take up a load than of friction."""
+STOPPED = 1e-3  # m/s, of a ball that rolled at 1 m/s
 WAYS = ("0°", "45°")
 """Directions of a slide, from an axis of the surface."""
 ONE_WAY = 0.05
@@ -126,8 +127,9 @@ def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         before, steps = round(WATCHED / dt), round(1.0 / dt)
         states = body.motions(start, dt, before + steps, -facts.gravity * UP, floor=True)[0]
         first, last = (float(states[row][VELOCITY][0]) for row in (before, -1))
-        kept.append(last / first if first else 0.0)
-        exact.append(float(spin_about_axis(1.0, first, heavy, 0.0, *drag)) / first if first else 0.0)
+        rolls = abs(first) > STOPPED
+        kept.append(last / first if rolls else 0.0)
+        exact.append(float(spin_about_axis(1.0, first, heavy, 0.0, *drag)) / first if rolls else 0.0)
     if facts.rolling or not facts.friction or facts.falls.cubic:
         return [replace(answer, measured=kept[0])]
     return [judged(body, answer, dts, kept, exact)]

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import Changes
-from dropspin.comparisons.diagnosis.mujoco_shapes import placed
+from dropspin.comparisons.diagnosis.mujoco_compiled import placed
 from dropspin.comparisons.diagnosis.source import option_setting, read_source
 from dropspin.comparisons.engines.mujoco_simulation import quiet
 from dropspin.scenarios import DropspinError
@@ -107,25 +107,27 @@ class MuJoCoFile:
         counted = [mesh for mesh in spec.meshes if mesh.inertia == mujoco.mjtMeshInertia.mjMESH_INERTIA_LEGACY]
         for mesh in counted:
             mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT
-        try:
-            with quiet():
-                return placed(spec.compile()) if counted else None
-        except ValueError:
-            return None
+        return self._recompiled(spec) if counted else None
 
     @cached_property
     def without_visual(self) -> tuple[Any, Any] | None:
         """The model, with its data, if geometries that collide with nothing, and of which the file gives no mass, have none.
 
-        None without such geometries, or if a body is left without mass.
+        Those of a body that has no other geometry keep theirs. None without such geometries.
         """
-        spec = self._spec.copy()
-        visual = [geom for geom in spec.geoms if not (geom.contype or geom.conaffinity or spec.pairs) and math.isnan(geom.mass)]
-        for geom in visual:
-            geom.mass = 0.0
+        spec, changed = self._spec.copy(), False
+        for body in spec.bodies:
+            visual = [geom for geom in body.geoms if not (geom.contype or geom.conaffinity or spec.pairs)]
+            for geom in visual if len(visual) < len(body.geoms) else ():
+                changed = changed or math.isnan(geom.mass)
+                geom.mass = 0.0 if math.isnan(geom.mass) else geom.mass
+        return self._recompiled(spec) if changed else None
+
+    def _recompiled(self, spec: Any) -> tuple[Any, Any] | None:
+        """A changed model, with its data; None if MuJoCo refuses it."""
         try:
             with quiet():
-                return placed(spec.compile()) if visual else None
+                return placed(spec.compile())
         except ValueError:
             return None
 

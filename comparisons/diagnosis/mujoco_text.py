@@ -9,8 +9,8 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, digits
 from dropspin.comparisons.diagnosis.loose_body import MassProperties
+from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile
-from dropspin.comparisons.diagnosis.mujoco_shapes import mass_properties
 from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
@@ -172,9 +172,7 @@ class BodyText:
             yield "friction", settings["friction"], f"used in part: {needed}, and condim is {condim}"
         if self._file.is_urdf:
             element = self.element
-            if element is not None and next(element.every("inertial"), None) is None:
-                made = f"missing: the mass is {in_force.mass:.4g} kg, that of its geometries at the default density"
-                yield "inertial", Setting("no inertial", element.file, element.line), made
+            yield from self._without_inertial()
             if self._file.model.body_weldid[self._head] == 0:
                 yield "base", Setting("the root link") if element is None else element.words, "welded to the world"
             for tag, value in IN_FORCE.items():
@@ -199,20 +197,31 @@ class BodyText:
             made = f'counted as {has.mass:.4g} kg by default; its volume has {exact.mass:.4g} kg, which inertia="exact" gives'
             yield "mesh", meshes[0].words if meshes else Setting("a mesh"), made
 
+    def _without_inertial(self) -> Iterator[tuple[str, Setting, str]]:
+        """The links of a URDF file, of the body and what is welded to it, of which the mass follows from the geometries."""
+        links = {link.attributes.get("name", ""): link for link in self._file.source.every("link")}
+        for number in self._file.group(self._head):
+            link, mass = links.get(mujoco.mj_id2name(self._file.model, BODY, number)), self._file.model.body_mass[number]
+            if link is not None and mass > 0.0 and next(link.every("inertial"), None) is None:
+                words = Setting(f"no inertial in link {link.attributes['name']}", link.file, link.line)
+                yield "inertial", words, f"missing: the mass is {mass:.4g} kg, that of the geometries at the default density"
+
     def _visual(self) -> Iterator[tuple[str, Setting, str]]:
         """Geometries that collide with nothing, and count in the mass by their density."""
         if self._file.without_visual is None or self.element is None:
             return
         group = self._file.group(self._head)
         has, least = (mass_properties(*compiled, group) for compiled in ((self._file.model, self._file.data), self._file.without_visual))
-        if has is not None and least is not None and has.mass - least.mass > NOTEWORTHY * has.mass:
-            model, own = self._file.model, [child for child in self.element.children if child.tag == "geom"]
-            of_body = np.flatnonzero(model.geom_bodyid == self._head)
-            visual = [
-                child for geom, child in zip(of_body, own, strict=False) if not (model.geom_contype[geom] or model.geom_conaffinity[geom])
-            ]
-            made = f"counted in the mass with {has.mass - least.mass:.4g} kg, by its density, although it collides with nothing"
-            yield "visual", visual[0].words if visual else Setting("a geometry"), made
+        if has is None or least is None or not has.mass - least.mass > NOTEWORTHY * has.mass:
+            return
+        model, elements = self._file.model, [geom for geom in self.element.every("geom") if _body_of(geom) is self.element]
+        geoms = np.flatnonzero(model.geom_bodyid == self._head)
+        is_same = len(geoms) == len(elements)
+        visual = [
+            one for geom, one in zip(geoms, elements, strict=is_same) if not (model.geom_contype[geom] or model.geom_conaffinity[geom])
+        ]
+        words = visual[0].words if visual and is_same else Setting("geometries that collide with nothing")
+        yield "visual", words, f"counted in the mass with {has.mass - least.mass:.4g} kg, by density, although it collides with nothing"
 
     def _changed(self, name: str, made: str) -> tuple[str, Setting, str]:
         """A quantity that the compiler changes, with what is written, and the setting that changes it."""
@@ -222,3 +231,11 @@ class BodyText:
         if written is None:
             return name, why[0] if why else Setting(name), made
         return name, written, made + (f", by {why[0]}" if why else "")
+
+
+def _body_of(geom: Element) -> Element | None:
+    """The body that a geometry is part of, also if it is within frames."""
+    place = geom.parent
+    while place is not None and place.tag not in ("body", "worldbody"):
+        place = place.parent
+    return place

@@ -34,7 +34,9 @@ class Targets(NamedTuple):
         """The answers, those that miss a target with a finding; and one for each target that nothing was measured for."""
         yield from (self._judged(body, answer) for answer in answers)
         facts, measured = body.facts, {answer.quantity for answer in answers} if not body.facts.missed else set()
-        why = facts.missed or ("the body lands on no surface" if not facts.surface else "gravity does not hold the body on a surface")
+        why = facts.missed or "the body lands on no surface"
+        if facts.surface and not facts.missed:
+            why = "the simulation broke down" if facts.lands else "gravity does not hold the body on a surface"
         for quantity in (name for name in self.wanted if name not in measured):
             question = "impact" if quantity == REBOUND else "friction"
             finding = Finding("target", detail=f"the target is {self.wanted[quantity]:g}, but {why}")
@@ -66,7 +68,7 @@ NO_TARGETS = Targets()
 
 
 def answers_to(question: Question, body: LooseBody, targets: Targets = NO_TARGETS) -> Iterator[Answer]:
-    """The answers to a question, each finding with the remedies that remove it and miss no target; of a breakdown, the reason."""
+    """The answers to a question, each finding with the remedies that remove it and miss no target that was met; of a breakdown, why."""
     dt = body.facts.dt
     try:
         answers = question(body, [dt * factor for factor in HALVINGS])

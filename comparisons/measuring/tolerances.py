@@ -73,7 +73,7 @@ def perturbed(scene: Scenario, starts: Sequence[Scenario], precision: type) -> l
 def _moved(scene: Scenario, signs: Array, precision: type) -> Scenario:
     start, sizes = scene.initial_state, np.full(13, PERTURBATION * float(np.finfo(precision).eps))
     if scene.floor is not None and not scene.starts_above_floor:
-        sizes[[1, 3, 4, 5, 6]] = PERTURBATION * float(np.finfo(float).eps)
+        sizes[: 7 if scene.wall else 0] = sizes[[1, 3, 4, 5, 6]] = PERTURBATION * float(np.finfo(float).eps)
     return scene.starting_at(start * (1.0 + sizes * signs))
 
 

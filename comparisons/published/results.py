@@ -90,7 +90,9 @@ def agreement(printed: str, value: float, significant: int = 0) -> Agreement:
         return Agreement(shown, value - limit, {"<": value < limit, ">": value > limit, "≤": at_most}[bound[1]])
     if TOLERANCE in printed:
         expected, tolerance = map(float, printed.split(TOLERANCE))
-        return Agreement(shown, value - expected, abs(value - expected) <= tolerance)
+        return Agreement(shown, value - expected, abs(value - expected) <= tolerance + ROUNDING * abs(expected))
+    if math.isnan(value):
+        return Agreement(shown, math.nan, agrees=False)
     here = f"{value:.{significant}g}" if significant else _rounded(printed, value)
     return Agreement(here, value - float(printed), Decimal(here) == Decimal(printed))
 

@@ -21,8 +21,8 @@ DATA = Path(__file__).parent / "data"
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
-def verify_printed(printed: str) -> str:
-    """Raise `ValueError` unless digits are those of a number, a bound, a number with a tolerance, or absent."""
+def verified_printed(printed: str) -> str:
+    """Digits of a number, a bound, a number with a tolerance, or none; `ValueError` for others."""
     bound = BOUND.fullmatch(printed)
     numbers = [bound[2]] if bound else printed.split(TOLERANCE)
     if printed != ABSENT and not (len(numbers) <= 2 and all(map(NUMBER.fullmatch, numbers))):
@@ -42,7 +42,7 @@ class Case(Table):
 
     case: str
     dt: float
-    printed: tuple[Annotated[str, AfterValidator(verify_printed)], ...]
+    printed: tuple[Annotated[str, AfterValidator(verified_printed)], ...]
 
 
 class Group(Table):

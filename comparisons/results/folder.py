@@ -179,7 +179,7 @@ def unfinished_folder(place: Path, name: str = "") -> Iterator[Path]:
 @contextmanager
 def one_at_a_time(path: str | Path) -> Iterator[None]:
     """Let one process at a time read, change and write a file; others wait, where the system can lock the file's folder."""
-    place = Path(path).resolve().parent
+    place = Path(os.path.realpath(path)).parent
     with ExitStack() as at_end:
         if sys.platform != "win32":
             with suppress(OSError):  # a file system without locks, or a folder that this user cannot read

@@ -42,24 +42,26 @@ def engine_entries(engines: Engine | str | Iterable[Engine | str], default: Sequ
         DropspinError: Two different engines have the same name.
     """
     entries: dict[str, EngineEntry] = {}
-    origins: dict[str, str] = {}
+    given: dict[str, Engine | str] = {}
     for asked in several("engines", engines) or default:
         entry = engine_entry(asked)
-        origin = _origin(asked)
-        if entries.setdefault(entry.label, entry) is not entry and origins[entry.label] != origin:
-            both = " and ".join((origins[entry.label], origin))
+        earlier = given.setdefault(entry.label, asked)
+        first, second = _origin(earlier), _origin(asked)
+        if first is not second and not (isinstance(first, str) and first == second):
+            both = " and ".join(
+                one if isinstance(one, str) else f"{type(one).__module__}:{type(one).__qualname__}" for one in (earlier, asked)
+            )
             raise DropspinError(f"engines: {both} both have the name {entry.label}; give one of them another name.")
-        origins[entry.label] = origin
+        entries.setdefault(entry.label, entry)
     return list(entries.values())
 
 
-def _origin(asked: Engine | str) -> str:
-    """The name of an engine of dropspin, or the class of another one with its module."""
+def _origin(asked: Engine | str) -> Engine | str:
+    """What two engines of one label have in common if they are the same: the name of an engine, or the object of a user's own one."""
     if isinstance(asked, str):
         return parsed(asked.strip())[0]
-    kind = type(asked)
-    is_own = asked.name in BUILT_IN and kind.__module__ == BUILT_IN[asked.name].module
-    return asked.name if is_own else f"{kind.__module__}:{kind.__qualname__}"
+    is_own = asked.name in BUILT_IN and type(asked).__module__ == BUILT_IN[asked.name].module
+    return asked.name if is_own else asked
 
 
 def present_entry(engine: Engine | str) -> EngineEntry:

@@ -191,7 +191,9 @@ class EngineProcesses:
 
     def renew(self, entry: EngineEntry) -> None:
         """Start a new process for an engine's next piece of work."""
-        pool = self._pools.pop(entry.label)
+        pool = self._pools.pop(entry.label, None)
+        if pool is None:  # its last piece of work ended it
+            return
         pool.stop()  # type: ignore[no-untyped-call]  # pebble's has no types
         pool.join()
         self._end_group(entry.label)

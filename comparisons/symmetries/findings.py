@@ -90,8 +90,8 @@ def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Eff
         pairs: The motions that should be equal.
         effects: The function that measures effects of rounding; None if it has none.
         precision: Of the engine's states.
-        away: Distance of the body from the origin in one of the motions, over its size. An engine with sub-steps rounds its position more
-            often than once in a step.
+        away: How much farther from the origin a translation moves the start, over the size of the body. An engine with sub-steps rounds its
+            position there more often than once in a step.
     """
     of_pairs = [differences(scene, *pair) for pair in pairs]
     difference: Array = np.max(of_pairs, axis=0)

@@ -11,7 +11,7 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.differences import differences
-from dropspin.comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES, Symmetry
+from dropspin.comparisons.measuring.symmetries import AGAIN, BATCH, BITWISE, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES, Symmetry
 from dropspin.comparisons.measuring.tolerances import perturbed
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scenes, ignore, verify_time_step
@@ -126,20 +126,24 @@ def findings_of(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, nam
     if not any(finding.symmetry == AGAIN and finding.status == "lost" for finding in found):
         return found
     unknown = Finding(scene.name, entry.label, "", "not run", reason=NOT_REPEATED)
-    return [replace(unknown, symmetry=finding.symmetry) if finding.symmetry in SYMMETRIES else finding for finding in found]
+    return [finding if finding.symmetry in BITWISE else replace(unknown, symmetry=finding.symmetry) for finding in found]
 
 
 def _finding(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: str) -> Finding:
     none = Finding(scene.name, entry.label, name, "not run")
     try:
         pairs, effects = _pairs(entry, scene, dt, rows, name)
-        there = SYMMETRIES[name].transformed(scene) if name in SYMMETRIES else scene
-        away = float(np.linalg.norm(there.start.position)) / there.body.size
+        away = max(0.0, _distance(SYMMETRIES[name].transformed(scene)) - _distance(scene)) if name in SYMMETRIES else 0.0
         return judged(none, scene, dt, pairs, effects, entry.adapter.precision, away)
     except DropspinError as error:  # the transformed scene is no valid scene
         return not_run(none, Breakdown("declined", str(error)))
     except Exception as error:  # an engine is somebody else's code
         return not_run(none, classify(error))
+
+
+def _distance(scene: Scenario) -> float:
+    """Distance of the body from the origin at the start, over its size."""
+    return float(np.linalg.norm(scene.start.position)) / scene.body.size
 
 
 def _pairs(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: str) -> tuple[Pairs, Effects | None]:

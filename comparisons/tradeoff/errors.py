@@ -17,7 +17,6 @@ import numpy as np
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown, record, verify_accepted
@@ -39,7 +38,8 @@ FEWEST_POINTS = 6
 CONVERGED = 0.3
 """The share of the largest error of the motion below which the smallest must be."""
 WRONG = 0.01
-"""The error of a motion, in rad or relative to the scene, up to which it is not wrong, also if it does not fall."""
+"""The error of a motion, in rad or relative to the distance that it covers, up to which it is not wrong, also if it does not fall."""
+ROWS_OF_MOTION = 65
 SMALL, PATIENCE, PATIENCE_WHILE_LARGE = 1e-6, 2, 6
 
 
@@ -136,10 +136,19 @@ def _left_out(scene: Scenario, tried: Sequence[tuple[float, list[float]]], metri
     errors = [motion for _, (_, motion) in tried if np.isfinite(motion)]
     if not errors:
         return f"no error is finite at the {range_tried}: {reason}"
-    if len(errors) > FEWEST_POINTS and min(errors) > max(CONVERGED * max(errors), WRONG * scale(scene, METRICS[metric].unit)):
+    size = _covered(scene) if METRICS[metric].unit == "m" else 1.0
+    if len(errors) > FEWEST_POINTS and min(errors) > max(CONVERGED * max(errors), WRONG * size):
         unit = "" if METRICS[metric].unit == "1" else f" {METRICS[metric].unit}"
         return f"no convergence observed: {metric.replace('_', ' ')} is {min(errors):.3g} to {max(errors):.3g}{unit} at the {range_tried}"
     return ""
+
+
+def _covered(scene: Scenario) -> float:
+    """The largest distance of the exact motion from its start [m], at least the size of the body."""
+    truth = truth_for(scene)
+    assert truth is not None
+    position = truth(np.linspace(0.0, min(scene.duration, truth.horizon), ROWS_OF_MOTION)).position
+    return max(scene.body.size, float(np.linalg.norm(position - position[0], axis=1).max()))
 
 
 def _errors(entry: EngineEntry, scene: Scenario, dt: float, division: int, metrics: Sequence[str]) -> tuple[list[float], float]:

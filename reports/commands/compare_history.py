@@ -43,6 +43,7 @@ def _load_runs(places: tuple[str, ...]) -> "dict[str, Results]":
     Raises:
         DropspinError: A given folder is neither a run nor a folder of runs.
     """
+    from dropspin.comparisons.results.folder import is_unfinished
     from dropspin.comparisons.results.store import load_results
     from dropspin.scenarios import DropspinError
     from dropspin.scenarios.text import printable
@@ -51,7 +52,8 @@ def _load_runs(places: tuple[str, ...]) -> "dict[str, Results]":
     for place in places:
         path = Path(place)
         here = [path] if (path / "run.json").is_file() else sorted(file.parent for file in path.glob("*/run.json"))
-        if lost := [table.parent for table in sorted(path.glob("*/results.parquet")) if not (table.parent / "run.json").is_file()]:
+        tables = [table for table in sorted(path.glob("*/results.parquet")) if not is_unfinished(table.parent.name)]
+        if lost := [table.parent for table in tables if not (table.parent / "run.json").is_file()]:
             raise DropspinError(f"{lost[0]}: has results, and no run.json; it is not a whole run. Remove it, or run it again.")
         if not here:
             raise DropspinError(

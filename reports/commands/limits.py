@@ -46,11 +46,12 @@ def limits_command(scenes: tuple[str, ...], axes: tuple[str, ...], output: str, 
     if len({scene.name for scene in loaded}) < len(loaded):
         raise click.UsageError("a scene is given twice, or two files have the same name; give each scene once, or rename a file.")
     own = {scene.name: [name for name in axes if name not in AXES or AXES[name].applies(scene)] for scene in loaded}
-    having = [scene for scene in loaded if own[scene.name] or not axes] or loaded[:1]  # the error of find_limits lists its axes
-    without = {scene.name: f"it has no axis {' or '.join(axes)}" for scene in loaded if scene not in having}
+    if len(loaded) == 1 or not any(own.values()):  # the error of find_limits lists the axes of a scene
+        own = {scene.name: list(axes) for scene in loaded}
+    without = {name: f"it has no axis {' or '.join(axis for axis in axes if axis not in having)}" for name, having in own.items()}
     results = []
     with written_study(output, json_output) as keep:
-        for scene in having:
+        for scene in (scene for scene in loaded if own[scene.name] or not axes):
             with share_bar(scene.name) as on_progress:
-                results.append(find_limits(scene, axes=own[scene.name] or axes, **options, on_progress=on_progress))
-        keep(Limits(scenes=results, left_out=without))
+                results.append(find_limits(scene, axes=own[scene.name], **options, on_progress=on_progress))
+        keep(Limits(scenes=results, left_out={name: why for name, why in without.items() if len(own[name]) < len(axes)}))

@@ -18,7 +18,7 @@ from dropspin.reports.stories.numbers import capitalized, failing
 from dropspin.scenarios.text import counted
 
 MOST_MISSING = 5
-"""The most scenes that are listed as not covered."""
+"""The most scenes with an engine that are listed as not covered."""
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
 
 
@@ -79,10 +79,13 @@ def sentences(checked: Checked, run: str, baseline: str | None) -> list[str]:
 
 def not_covered(checked: Checked) -> str:
     """The number of accepted results that a run does not cover, and of which scenes and engines they are."""
-    are, pairs = counted(len(checked.not_run), "accepted result is", "accepted results are"), checked.not_run.groupby("scene")["engine"]
-    missing = [f"{scene} with {', '.join(dict.fromkeys(engines))}" for scene, engines in pairs]
-    more = [f"{len(missing) - MOST_MISSING:,} other scenes"] if len(missing) > MOST_MISSING + 1 else missing[MOST_MISSING:]
-    return f"{are} not covered by this run: {'; '.join(missing[:MOST_MISSING] + more)}"
+    are, results = counted(len(checked.not_run), "accepted result is", "accepted results are"), checked.results
+    missing = []
+    for (scene, engine), rows in checked.not_run.groupby(["scene", "engine"], sort=False):
+        was_run = scene in results.scenes and engine in results.engines  # at other time steps
+        missing.append(f"{scene} with {engine}" + (f" at {'; '.join(dict.fromkeys(rows['steps']))} s" if was_run else ""))
+    more = [f"{len(missing) - MOST_MISSING:,} other pairs"] if len(missing) > MOST_MISSING + 1 else missing[MOST_MISSING:]
+    return f"{are} not covered by this run: {', '.join(missing[:MOST_MISSING] + more)}"
 
 
 def _verdict(checked: Checked, failed_rows: pd.DataFrame, verdict: str) -> str:

@@ -12,7 +12,7 @@ import pytest
 from support import engines as made
 
 from dropspin.comparisons.conformance import motions, timing
-from dropspin.comparisons.conformance.checks import AFTER_OTHERS, AFTER_SIMILAR, CHECKS, conform, run_check
+from dropspin.comparisons.conformance.checks import CHECKS, conform, run_check
 from dropspin.comparisons.conformance.outcomes import CheckFailed
 from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.conformance.timing import check_velocity_lag
@@ -403,27 +403,6 @@ def test_adapter_that_writes_into_an_array_of_the_scene_is_named():
 
     [found] = conform(Writing(), ["builds what is meant"])
     assert found.message.startswith("the adapter writes into scene.body.inertia_tensor, ")
-
-
-class Caching(made.Exact):
-    """Keeps the floor of the first scene for all others, as a cache with too few keys does."""
-
-    def __init__(self):
-        super().__init__()
-        self._floor = None
-
-    def prepare(self, scene, dt):
-        self._floor = self._floor or scene.floor
-        return super().prepare(scene.model_copy(update={"floor": scene.floor and self._floor}), dt)
-
-
-@pytest.mark.usefixtures("engine_processes")
-def test_state_that_other_scenes_leave_is_found():
-    """Each scene gives the same bits in one process, whatever runs between; other orders differ, and a check that runs alone passes."""
-    found = {one.check: one for one in conform(Caching(), ["bouncing ball", "repeats", "dull ball"])}
-    assert [one.outcome for one in found.values()] == ["passed", "failed", "failed"]
-    assert found["repeats"].message == AFTER_SIMILAR
-    assert found["dull ball"].message.startswith(AFTER_OTHERS)
 
 
 def test_unknown_check_suggests_the_nearest_name():

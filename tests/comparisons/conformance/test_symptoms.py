@@ -16,7 +16,6 @@ from dropspin.comparisons.faults.mistakes import Mistake
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.scenarios import Trajectory, truth_for
 from dropspin.scenarios.rotations import cross, rotate, unrotate
-from dropspin.scenarios.variations import changed
 
 BALLS = tuple(probe.name for probe in PROBES if probe.name.endswith(" ball") or probe.name.endswith(" floor"))
 SQUARED = "restitution appears to be squared; an engine that multiplies the values of two bodies needs 1 for the floor"
@@ -235,89 +234,3 @@ def test_lag_that_drifts_has_no_number():
     """Steps of at most 5 ms: displacements are half of those that velocity gives."""
     engine = type("Short", (made.Exact,), {"prepare": lambda self, scene, dt: made.ExactSimulation(scene, min(dt, 0.005))})()
     assert failed(engine, "velocity lag") == {"velocity lag": NO_LAG}
-
-
-class Unbalanced(made.Exact):
-    """The centre of mass is beside that of the shape."""
-
-    centre = (0.01, 0.0, 0.0)
-
-    def prepare(self, scene, dt):
-        tensor = scene.body.inertia_tensor.tolist()
-        other = changed(scene, body={"center_of_mass": self.centre, "inertia": tensor})
-        return super().prepare(other.starting_at(scene.initial_state), dt)
-
-
-def test_ball_that_a_floor_without_friction_turns_has_its_centre_of_mass_elsewhere():
-    """Its restitution is right, although the speed of the centre of mass after an impact is not."""
-    found = failed(Unbalanced(), "bouncing ball", "later impacts")
-    message = "a floor without friction turns a ball: the impulse acts 0.01 m beside the centre of mass, which is the centre of the ball"
-    assert found["later impacts"] == message
-    assert found["bouncing ball"].startswith(f"{message}; position is off by ")
-
-
-def test_restitution_of_a_body_that_touches_at_another_height_is_not_stated():
-    """The speeds at the exact contact point would give 0.665, but another point touches."""
-    engine = Unbalanced()
-    engine.centre = (0.02, 0.01, -0.015)
-    [message] = failed(engine, "corner").values()
-    assert message.startswith("the first contact begins at a height of 0.2286 m instead of 0.208056 (9.9 % too high); position is off by ")
-
-
-def test_friction_of_half_the_size_is_no_mistake_in_the_equations():
-    """The probe of the floor names it; in an impact it could be that of a squared speed."""
-    engine = Bouncing(title="halved", law=lambda *impact: coulomb(*impact, factor=0.5))
-    found = failed(engine, "impacts", "slippery floor")
-    assert set(found) == {"slippery floor"}
-    assert found["slippery floor"].startswith("friction appears to be halved")
-
-
-def test_fault_that_several_other_probes_contradict_is_not_named():
-    """The root of the restitution is near the mean of 0.6 and 1 in one probe, and neither that nor right in two others."""
-    found = failed(Bouncing(title="root", law=with_restitution(lambda e, speed: e**0.5)), "slow ball", "dull ball")
-    assert all(message.startswith("restitution is 0.") for message in found.values())
-
-
-class OtherGravity(made.Exact):
-    """Has another gravity than the scene's."""
-
-    def prepare(self, scene, dt):
-        changed = None if scene.gravity is None else type(scene.gravity)(acceleration=self.of(scene.acceleration).tolist())
-        return super().prepare(scene.model_copy(update={"gravity": changed}), dt)
-
-
-@pytest.mark.parametrize(
-    ("of", "message"),
-    [
-        (lambda g: 2.0 * g, "gravity acts twice"),
-        (lambda g: np.array([0.0, -9.81, 0.0]), "gravity is 9.81 m/s² along -y for every scene that has gravity"),
-        (lambda g: g * [0.0, 1.0, 0.0], "gravity acts along y only; it is a vector"),
-    ],
-)
-def test_other_gravity_is_named_and_no_wrong_time(of, message):
-    """The velocity is ever earlier than in the exact fall, not by a number of steps."""
-    engine = OtherGravity()
-    engine.of = of
-    assert failed(engine, "time", "falling") == {"falling": message}
-
-
-def test_states_of_a_point_beside_the_centre_of_mass_are_named():
-    """No damping, although its speed falls as the body turns; about one axis, only the distance from it is known."""
-    at = np.array([0.01, -0.02, 0.005])
-
-    class Beside(made.Exact):
-        def prepare(self, scene, dt):
-            start = scene.initial_state
-
-            def shifted(row, time):
-                arm, arm_at_start = rotate(row[3:7], at), rotate(start[3:7], at)
-                spins = cross(row[10:], arm) - cross(start[10:], arm_at_start)
-                return row + np.concatenate([arm - arm_at_start, np.zeros(4), spins, np.zeros(3)])
-
-            return made.ExactSimulation(scene, dt, shifted)
-
-    found = failed(Beside(), "tumbling", "fast")
-    assert found == {
-        "tumbling": "the states are those of a point 0.023 m from the centre of mass, at (0.01, -0.02, 0.005) m in the body frame",
-        "fast": "the states are those of a point beside the centre of mass, 0.011 m from the axis of rotation",
-    }

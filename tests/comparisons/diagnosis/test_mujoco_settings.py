@@ -304,14 +304,21 @@ def test_a_body_that_trembles_on_an_undamped_contact_of_the_file_is_due_to_this_
 
 
 def test_mass_of_geometries_that_the_file_gives_no_mass_is_named(tmp_path):
-    """A box of 1.2 litres: beside one of 1 kg that collides, and as the only geometry of a link."""
-    visual = '<geom type="box" size=".1 .05 .03" mass="1"/><geom type="box" size=".1 .05 .03" contype="0" conaffinity="0"{}/>'
+    """A box of 1.2 litres: in a frame before one of 1 kg that collides, and as the only geometry of a link that is welded to another."""
+    size = 'type="box" size=".1 .05 .03"'
+    visual = f'<frame><geom name="v" {size} contype="0" conaffinity="0"{{}}/></frame><geom {size} mass="1"/>'
     made = {}
     for mass in ("", ' mass="0"'):
-        found = body_of(tmp_path, FREE.format(visual.format(mass))).facts.ignored
-        made[mass] = [(name, text) for name, _, text in found]
+        alone = '<body name="marker" pos="1 0 1"><freejoint/><geom size=".1" contype="0" conaffinity="0"/></body>'
+        found = body_of(tmp_path, FREE.format(visual.format(mass)) + alone, name="b").facts.ignored
+        made[mass] = [(name, setting.text.split()[1], text) for name, setting, text in found]
     assert made[' mass="0"'] == []
-    assert made[""] == [("visual", "counted in the mass with 1.2 kg, by its density, although it collides with nothing")]
-    link = '<link name="b"><collision><geometry><box size="0.2 0.1 0.06"/></geometry></collision></link>'
-    found = body_of(tmp_path, f'<robot name="r">{link}</robot>', file="model.urdf").facts.ignored
-    assert "missing: the mass is 1.2 kg, that of its geometries at the default density" in [text for _, _, text in found]
+    assert made[""] == [("visual", 'name="v"', "counted in the mass with 1.2 kg, by density, although it collides with nothing")]
+    geometry = '<collision><geometry><box size="0.2 0.1 0.06"/></geometry></collision>'
+    inertial = '<inertial><mass value="5"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    joint = '<joint name="{}" type="fixed"><parent link="{}"/><child link="{}"/></joint>'
+    links = f'<link name="foot"/><link name="b">{inertial}{geometry}</link><link name="c">{geometry}</link>'
+    text = f'<robot name="r">{links}{joint.format("j", "foot", "b")}{joint.format("k", "b", "c")}</robot>'
+    found = body_of(tmp_path, text, file="model.urdf").facts.ignored
+    missing = [(setting.text, made) for name, setting, made in found if name == "inertial"]
+    assert missing == [("no inertial in link c", "missing: the mass is 1.2 kg, that of the geometries at the default density")]

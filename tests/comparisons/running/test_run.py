@@ -254,6 +254,10 @@ def test_two_engines_of_one_name_are_refused_by_studies_too():
     both = r"support\.engines:Exact and .*:Other both have the name exact"
     with pytest.raises(DropspinError, match=f"engines: {both}; give one of them another name"):
         engine_entries([made.Exact(), other()])
+    with pytest.raises(DropspinError, match="both have the name exact"):  # of one class, which may have different parameters
+        engine_entries([made.Exact(), made.Exact()])
+    same = made.Exact()
+    assert [entry.label for entry in engine_entries([same, same])] == ["exact"]
     assert [entry.label for entry in engine_entries(["mujoco", MuJoCo(), "mujoco[integrator=euler]"])] == ["mujoco"]
 
 

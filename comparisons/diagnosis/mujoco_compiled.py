@@ -1,0 +1,29 @@
+"""A compiled model of MuJoCo with its data, and the mass properties of its bodies."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from dropspin.comparisons.diagnosis.loose_body import MassProperties
+
+
+def placed(model: Any) -> tuple[Any, Any]:
+    """A compiled model, and its data with the bodies where the file has them."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return model, data
+
+
+def mass_properties(model: Any, data: Any, group: Sequence[int]) -> MassProperties | None:
+    """Those of a body and what is welded to it, in the frame of the body, the first of the group; None without mass."""
+    masses, origin, turn = model.body_mass[group], data.xpos[group[0]], data.xmat[group[0]].reshape(3, 3)
+    if not masses.sum() > 0.0:
+        return None
+    points = (data.xipos[group] - origin) @ turn
+    centre, inertia = np.average(points, axis=0, weights=masses), np.zeros((3, 3))
+    for mass, moments, axes, arm in zip(masses, model.body_inertia[group], data.ximat[group], points - centre, strict=True):
+        turned = turn.T @ axes.reshape(3, 3)
+        inertia += turned @ np.diag(moments) @ turned.T + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return MassProperties(float(masses.sum()), centre, inertia)

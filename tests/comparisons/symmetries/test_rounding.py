@@ -1,0 +1,51 @@
+"""Symmetries of engines whose rounding is large, and of engines that do not repeat their motion."""
+
+import numpy as np
+import pytest
+from support import engines as made
+
+from dropspin.comparisons.measuring.symmetries import AGAIN, HALVES, SYMMETRIES
+from dropspin.comparisons.symmetries.study import symmetries
+from dropspin.scenarios import load
+
+
+def statuses(engine, scene, dt=4e-3):
+    return {one.symmetry: one for one in symmetries(scene, engine, dt=dt)}
+
+
+@pytest.mark.parametrize(("drift", "status"), [(0.0, "rounding"), (1e-3, "lost")])
+def test_rounding_in_sub_steps_explains_a_difference_far_away(drift, status):
+    """A position that is added up in 64 sub-steps of each step is rounded to 1e-10 m in each, a thousand kilometres away."""
+
+    class Adding(made.ExactSimulation):
+        def record(self, steps, every=1):
+            rows, start = super().record(steps, every), self._start
+            steps_of_position = np.tile(start[7:10] * self._dt / 64, (64 * steps, 1))
+            rows[1:, :3] = np.cumsum(np.concatenate([start[None, :3], steps_of_position]), axis=0)[64::64]
+            rows[:, 0] += drift * self._dt * np.arange(len(rows)) * (abs(start[0]) > 1e5)
+            return rows
+
+    engine_ = type("SubSteps", (made.Exact,), {"prepare": lambda self, scene, dt: Adding(scene, dt)})()
+    body = {"shape": "sphere", "radius": 0.1, "mass": 1.0}
+    scene = load({"duration": 2.0, "body": body, "start": {"velocity": [0.1, 0.07, -0.03], "angular_velocity": [1.0, 2.0, 3.0]}})
+    found = statuses(engine_, scene, dt=1e-3)
+    assert (found["1000 km away"].status, found["1000 km away"].difference > 1e-5) == (status, True)
+    assert found["1 km away"].status in ("kept", "nearly kept")
+
+
+@pytest.mark.parametrize("precision_of_it", [np.float64, np.float32])
+def test_engine_that_does_not_repeat_its_motion_says_nothing_of_symmetries(precision_of_it):
+    """State that it keeps would be attributed to rounding, of which the effect is measured with the same engine."""
+
+    class Leaking(made.Exact):
+        precision, runs = precision_of_it, 0
+
+        def prepare(self, scene, dt):
+            type(self).runs += 1
+            push = 1e-4 * type(self).runs
+            return made.ExactSimulation(scene, dt, lambda state, time: state + push * np.eye(13)[0])
+
+    found = statuses(Leaking(), "fall-spin")
+    assert found[AGAIN].status == "lost"
+    reasons = {one.reason for name, one in found.items() if name in SYMMETRIES or name == HALVES}
+    assert reasons == {"the engine does not repeat its own motion, so that a difference from another one says nothing of a symmetry"}

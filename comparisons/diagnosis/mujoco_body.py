@@ -11,8 +11,8 @@ from mujoco import rollout
 
 from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
-from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
-from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ENUMERATIONS, GEOM, OPTIONS, PLANE, MuJoCoFile, lowers_margin
+from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties
+from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ENUMERATIONS, GEOM, OPTIONS, PLANE, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.diagnosis.parts import Part, Support, at_point

@@ -1,6 +1,7 @@
-"""A compiled model of MuJoCo with its data, and the mass properties of its bodies."""
+"""A compiled model of MuJoCo with its data, the mass properties of its bodies, and what depends on the version of MuJoCo."""
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import mujoco
@@ -27,3 +28,13 @@ def mass_properties(model: Any, data: Any, group: Sequence[int]) -> MassProperti
         turned = turn.T @ axes.reshape(3, 3)
         inertia += turned @ np.diag(moments) @ turned.T + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     return MassProperties(float(masses.sum()), centre, inertia)
+
+
+@cache
+def lowers_margin() -> bool:
+    """Whether contacts act only below margin - gap, as in older versions of MuJoCo; in newer ones they act below the margin."""
+    ball = '<worldbody><geom type="plane" size="0 0 1"/><body><freejoint/><geom size="1" margin="2" gap="1"/></body></worldbody>'
+    model = mujoco.MjModel.from_xml_string(f"<mujoco>{ball}</mujoco>")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return bool(data.contact.includemargin[0] < 2.0)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from copy import copy
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -292,16 +292,6 @@ def set_options(option: Any, compiled: Any, dt: float, changes: Changes) -> None
         setattr(option, name, ENUMERATIONS[value] if isinstance(value, str) else value)
     option.timestep = dt
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-
-
-@cache
-def lowers_margin() -> bool:
-    """Whether contacts act only below margin - gap, as in older versions of MuJoCo; in newer ones they act below the margin."""
-    ball = '<worldbody><geom type="plane" size="0 0 1"/><body><freejoint/><geom size="1" margin="2" gap="1"/></body></worldbody>'
-    model = mujoco.MjModel.from_xml_string(f"<mujoco>{ball}</mujoco>")
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return bool(data.contact.includemargin[0] < 2.0)
 
 
 def one_line(error: Exception) -> str:

@@ -183,7 +183,7 @@ def _never_rests(motion: ExtendedMotion, whole: Comparison) -> Iterator[Diagnosi
 
 
 class HeldSpeed(NamedTuple):
-    """The largest values that the components of a velocity and its length have, where they are possibly clamped [m/s, rad/s].
+    """The largest values that the components of a velocity and its length have, where they are possibly clamped [m/s, rad/s]; else NaN.
 
     Such a speed is reduced after the first step, or is suddenly constant to the last digit. Both may have other causes, unless another
     initial state gives the same value.

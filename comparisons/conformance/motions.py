@@ -213,20 +213,25 @@ def symptoms(probe: Probe, motion: Trajectory) -> Iterator[str]:
         yield "the body stops: the engine puts it to sleep"
         return
     elif probe.scene.gravity is None:
-        yield from _of_flight(probe.scene, rows[-1], exact[-1])
+        yield from _of_flight(probe, rows[probe.rows], exact)
     for (name, unit), error, allowed in zip(QUANTITIES, differences(rows[probe.rows], exact), probe.allowed, strict=True):
         if not error <= allowed:
             yield f"{name} is off by {error:.{min(digits_that_differ(error, allowed), 4)}g} {unit} (allowed: {allowed:g} {unit})"
 
 
-def _of_flight(scene: Scenario, end: Array, exact: Array) -> Iterator[str]:
-    """Speeds at the end of a motion without gravity and floor; of unequal moments the angular momentum, as the angular speed varies."""
-    inertia = scene.body.inertia_tensor
+def _of_flight(probe: Probe, states: Array, exact_states: Array) -> Iterator[str]:
+    """Speeds at the end of a motion without gravity and floor; of unequal moments the angular momentum, as the angular speed varies.
+
+    Velocities that are wrong beside right positions, or angular velocities beside right attitudes, are not due to damping.
+    """
+    scene, end, exact = probe.scene, states[-1], exact_states[-1]
+    (position, attitude, *_), inertia = differences(states, exact_states), scene.body.inertia_tensor
     spin = ("angular velocity", "rad/s", end[SPIN], exact[SPIN])
     if np.ptp(np.linalg.eigvalsh(inertia)) > CLEAR * inertia.max():
         got, right = (rotate(state[ORIENTATION], inertia @ unrotate(state[ORIENTATION], state[SPIN])) for state in (end, exact))
         spin = ("angular momentum", "kg m²/s", got, right)
-    for quantity, unit, got, right in (("speed", "m/s", end[VELOCITY], exact[VELOCITY]), spin):
+    speeds = (("speed", "m/s", end[VELOCITY], exact[VELOCITY]), position, VELOCITY), (spin, attitude, SPIN)
+    for (quantity, unit, got, right), off, part in speeds:
         final, expected = float(np.linalg.norm(got)), float(np.linalg.norm(right))
         if abs(final - expected) > CLEAR * expected:
             too_fast, too_slow = "", "damping or a clamp that the scene does not have: "
@@ -236,7 +241,10 @@ def _of_flight(scene: Scenario, end: Array, exact: Array) -> Iterator[str]:
                 too_slow = ""  # damping lowers the energy too
             elif quantity == "angular momentum" and np.linalg.norm(got - right * final / expected) > ALONG * (expected - final):
                 too_slow = "damping, a clamp or a wrong gyroscopic term: "  # damping in proportion to the momentum does not turn it
-            yield f"{too_slow if final < expected else too_fast}the final {quantity} is {instead(final, expected, unit)}"
+            why, beside = too_slow if final < expected else too_fast, ""
+            if off <= CLEAR * float(np.linalg.norm(exact[part])) * scene.duration:
+                why, beside = "", f", beside {'positions' if quantity == 'speed' else 'attitudes'} that are right"
+            yield f"{why}the final {quantity} is {instead(final, expected, unit)}{beside}"
 
 
 def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:

@@ -75,7 +75,8 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     """The answers of a run, for each metric of `QUESTIONS` that it has and each engine that was tried in one of its scenes.
 
     An error is within the tolerance if its size plus its uncertainty, the column `tolerance`, is; it is beyond if its size minus that
-    uncertainty is. A time step at which the engine broke down is beyond. Scenes that are compared with a recording do not count.
+    uncertainty is. Where the engine is in another flight than the exact solution at every time step, an error that is compared up to then
+    is undecided. A time step at which the engine broke down is beyond. Scenes that are compared with a recording do not count.
 
     Args:
         results: The run.
@@ -90,6 +91,10 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     sizes = np.array(relative_sizes(errors, results.scenes))
     uncertain = np.array(relative_sizes(errors.assign(value=errors["tolerance"].fillna(0.0)), results.scenes))
     states = np.select([sizes + uncertain <= within, sizes - uncertain > within], ["within", "beyond"], "undecided")
+    lost = table[(table["metric"] == "desync_rate") & (table["kind"] == "asymptotic_error") & (table["verdict"] == "failed")]
+    pair = ["scene", "engine"]
+    is_lost = pd.MultiIndex.from_frame(errors[pair]).isin(pd.MultiIndex.from_frame(lost[pair])) & (errors["metric"] != "position_error")
+    states = np.where(is_lost & (states == "within"), "undecided", states)
     found = errors.assign(size=sizes, state=states, cost=errors["time_per_step"] / errors["dt"])
     keys = ["engine", "scene", "dt"]
     steps = tried[keys].assign(default=np.where(is_broken[tried.index], "beyond", "undecided")).drop_duplicates(keys)

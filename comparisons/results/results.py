@@ -22,6 +22,8 @@ from dropspin.scenarios import Scenario, Trajectory, UnknownName, reference_for
 TrajectoryKey = tuple[str, str, float]
 FRAMES = ("table", "predictions", "agreements")
 """The tables of a run."""
+RISEN = 0.01
+"""An error that rises above this from one time step to a finer one, in its unit, leaves the trend undecided."""
 SMALLEST_STATED = 1e-4
 """Errors below this, in their units (SI, or ratios), are neither mentioned in summaries and reports nor undecided."""
 
@@ -230,11 +232,15 @@ def relative_sizes(rows: pd.DataFrame, scenes: Mapping[str, Scenario]) -> list[f
 def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
     """Which rows are asymptotic errors whose interval contains 0 and values that are not negligible, so that no cause is stated.
 
-    An error within rounding at the finest time step is not undecided, whatever the errors at coarser time steps are.
+    An error within rounding at the finest time step is not undecided, unless it rises from one time step to a finer one, to more than 0.01.
     """
     of, reach = ["scene", "engine", "metric"], rows[["lower", "upper"]].abs().max(axis=1)
-    errors = rows[rows["kind"].isin(["truth", "invariant"])].sort_values("dt").drop_duplicates(of)
-    rounded = pd.MultiIndex.from_frame(errors.loc[errors["value"].abs() <= NEGLIGIBLE, of])
+    errors = rows[rows["kind"].isin(["truth", "invariant"])].sort_values("dt", ascending=False)
+    sizes = errors["value"].abs().where(lambda size: size > NEGLIGIBLE, 0.0)
+    rises = (sizes > RISEN) & (sizes > sizes.groupby([errors[name] for name in of]).shift())
+    ever = rises.groupby([errors[name] for name in of]).transform("any")
+    finest = errors.assign(is_rounded=(sizes == 0.0) & ~ever).drop_duplicates(of, keep="last")
+    rounded = pd.MultiIndex.from_frame(finest.loc[finest["is_rounded"], of])
     is_open = (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & (reach > SMALLEST_STATED)
     return is_open & ~pd.MultiIndex.from_frame(rows[of]).isin(rounded)
 

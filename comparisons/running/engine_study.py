@@ -13,6 +13,7 @@ from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.judging.convergence import (
     ADDED_STEPS,
     ARTEFACTS,
+    JUMPING,
     Claim,
     Convergence,
     SeriesPoint,
@@ -217,6 +218,8 @@ class EngineStudy:
             4. refined      an error that does not vanish with the time step alone, but together with the options that set the accuracy of
                             the engine, is attributed to these options
             5. calibrated   a model error is a setting error if the engine with calibrated settings has none or a smaller one
+            6. jumping      a metric that jumps from flight to flight has a model error only if another one has, because it may stay at a
+                            value while the error that causes it falls slowly
 
         Returns:
             The convergence that counts, with its cause.
@@ -245,8 +248,17 @@ class EngineStudy:
             calibrated = self.calibrated.cause(name).budget
             if max(-calibrated.lower, calibrated.upper) < max(found.budget.lower, -found.budget.upper):
                 found = replace(found, budget=replace(found.budget, cause="setting"))
+        if name in JUMPING and found.budget.cause == "model" and not self._is_wrong_elsewhere():
+            budget = found.budget
+            reason = "stays at its value at these time steps, from which it may jump; no other error of this scene is one of the model"
+            found = replace(found, budget=replace(budget, cause="unresolved", reason=reason, lower=min(budget.lower, 0.0)))
         self.causes[name] = found
         return found
+
+    def _is_wrong_elsewhere(self) -> bool:
+        """Whether an error that changes with a power of the time step is one of the model or the settings."""
+        others = (other for other in self.series if other not in JUMPING and METRICS[other].kind == "truth")
+        return any(self.cause(other).budget.cause in ("model", "setting") for other in others)
 
     def _longer(self, metric: Metric, added: Sequence[float]) -> Convergence | None:
         """The convergence over the requested and other time steps; None if the engine gives no result at these."""

@@ -25,7 +25,7 @@ MEANINGS = {
     f"passed ({UNDECIDED})": "as passed, but an error may remain as dt → 0",
     "failed": "a check is outside its bound",
     "failed (diverged)": "a state was not finite, or the engine reported a breakdown",
-    "failed (crashed)": "the process of the engine ended",
+    "failed (crashed)": "the engine raised an exception, or its process ended",
     "failed (timed out)": "the engine exceeded the time limit",
     "failed (broken)": "the adapter cannot be loaded",
     "known fault": "an error that the scene's file lists as expected of this engine",

@@ -119,3 +119,17 @@ def test_rows_that_are_late_by_some_steps_are_named(rows, words):
             return Delayed(scene, dt)
 
     assert failed(Late(), "time") == {"time": f"the attitude is {words}: it does not belong to the time of its row"}
+
+
+def test_velocities_that_are_wrong_beside_right_positions_are_no_damping():
+    """Too low by 1 % from the first step on, also where the scene has damping."""
+
+    class Slow(made.Exact):
+        def prepare(self, scene, dt):
+            return made.ExactSimulation(scene, dt, lambda row, time: row * np.repeat([1.0, 0.99], [7, 6]))
+
+    found = failed(Slow(), "coasting", "damped", "turning", "fast")
+    speeds = {name: message.split(";")[0] for name, message in found.items()}
+    assert speeds["coasting"] == "the final speed is 2.387 m/s instead of 2.41091 (1 % too low), beside positions that are right"
+    assert all(message.endswith((" beside positions that are right", " beside attitudes that are right")) for message in speeds.values())
+    assert not any("damping" in message or "clamp" in message for message in found.values())

@@ -1,0 +1,73 @@
+"""Engines that leave the flights of the exact solution: what a run concludes of errors that are compared up to then, and of the jump."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from support import engines as made
+
+import dropspin as ds
+from dropspin.comparisons.results.conclusion import conclude
+from dropspin.comparisons.results.results import is_undecided
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.variations import changed
+
+BALL = load("drop-ball")
+LIVELY = tuple(changed(BALL, duration=2.0, floor={"restitution": e}).model_copy(update={"name": f"ball-{e}"}) for e in (0.8, 0.82, 0.85))
+
+
+class DeadAtThird(made.Exact):
+    """Stops at the third impact."""
+
+    name = "dead"
+
+    def prepare(self, scene, dt):
+        third = truth_for(scene).events[2].time
+        still = np.repeat([1.0, 0.0], [7, 6])
+
+        def stopped(row, time):
+            return row if time < third else np.where(np.arange(13) == 1, scene.body.radius, row * still)
+
+        return made.ExactSimulation(scene, dt, stopped)
+
+
+@pytest.mark.usefixtures("all_start_phases")
+def test_engine_in_another_flight_is_not_recommended_for_errors_that_are_compared_up_to_then():
+    """Its energy is right up to the third impact, and 26 to 38 % too low from then on."""
+    results = ds.run(LIVELY, [made.Exact(), DeadAtThird()])
+    answers = {(answer.metric, answer.engine): answer for answer in conclude(results)}
+    for metric in ("energy_error", "bounce_height_error"):
+        assert answers[metric, "exact"].is_recommended
+        assert not answers[metric, "dead"].is_recommended
+        assert set(answers[metric, "dead"].undecided) == {scene.name for scene in LIVELY}
+
+
+class HalfOrder(made.Exact):
+    """Restitution is too high by 0.4 √dt, which vanishes as dt → 0."""
+
+    name = "half"
+
+    def prepare(self, scene, dt):
+        lively = changed(scene, floor={"restitution": scene.floor.restitution + 0.4 * dt**0.5})
+        return made.ExactSimulation(lively.starting_at(scene.initial_state), dt)
+
+
+@pytest.mark.usefixtures("all_start_phases")
+def test_flight_that_is_the_same_at_all_time_steps_is_no_model_error():
+    """The body leaves the exact flights at the same impact at 4, 2 and 1 ms."""
+    table = ds.run([BALL], [HalfOrder()]).table
+    rows = table[table["kind"] == "asymptotic_error"].set_index("metric")
+    assert rows.loc["restitution_error", "cause"] in ("discretisation", "unresolved")
+    assert (rows.loc["desync_rate", "cause"], rows.loc["desync_rate", "verdict"]) == ("unresolved", "measured")
+    assert rows.loc["desync_rate", "lower"] <= 0.0 < rows.loc["desync_rate", "value"]
+
+
+@pytest.mark.parametrize(
+    ("errors", "undecided"), [([84.0, 0.0], True), ([1e-3, 0.0], False), ([1e-9, 84.0, 0.0], True), ([84.0, 1e-3, 0.0], False)]
+)
+def test_trend_of_an_error_that_rises_and_vanishes_is_undecided(errors, undecided):
+    """An error that is 0 at 4 and 1 ms and large at 2 ms falls with no power of the time step; one that only falls does."""
+    steps = [0.0] * (len(errors) == 2) + errors
+    rows = [("truth", 4e-3 / 2**number, value, np.nan, np.nan, "") for number, value in enumerate(steps)]
+    rows.append(("asymptotic_error", np.nan, 0.1, 0.0, 50.0, "unresolved"))
+    table = pd.DataFrame(rows, columns=["kind", "dt", "value", "lower", "upper", "cause"]).assign(scene="a", engine="b", metric="c")
+    assert is_undecided(table).tolist() == [False] * len(steps) + [undecided]

@@ -37,6 +37,14 @@ def rounded(value: float, digits: int) -> str:
     return f"{float(f'{value:.{digits}g}'):g}"
 
 
+def with_few_digits(value: str) -> str:
+    """An option's value; numbers with six digits."""
+    try:
+        return f"{float(value):g}"
+    except ValueError:
+        return value
+
+
 Text = Annotated[str, AfterValidator(verify_line)]
 """A field of a model whose value is printable text."""
 Prose = Annotated[Text, BeforeValidator(joined)]

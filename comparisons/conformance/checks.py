@@ -40,10 +40,10 @@ CHECKS: dict[str, Callable[[Engine], str]] = {
 
 SUSPECT = ("failed", "crashed")
 """Outcomes that state left by other checks may cause."""
-OF_PROCESSES = 1e-6
+BETWEEN_PROCESSES = 1e-6
 """Relative difference that rounding may cause between two processes."""
 AFTER_SIMILAR = "a scene has another motion after one that differs from it in one quantity than alone: a simulation leaves state behind"
-OF_PROCESS = "the same scene has another motion in another process: the engine is random, or depends on its process"
+ANOTHER_PROCESS = "the same scene has another motion in another process: the engine is random, or depends on its process"
 AFTER_OTHERS = "this check fails after other checks, but not alone: a simulation leaves state behind"
 
 
@@ -112,13 +112,13 @@ def _changed_by_similar(processes: EngineProcesses, entry: EngineEntry) -> str:
     def differ(alone: list[Array | None] | Breakdown, after: Array | None) -> bool:
         if isinstance(alone, Breakdown) or alone[0] is None:  # which other checks state
             return False
-        return after is None or not (protocol.same(alone[0], after) or protocol.relative_difference(alone[0], after) <= OF_PROCESSES)
+        return after is None or not (protocol.same(alone[0], after) or protocol.relative_difference(alone[0], after) <= BETWEEN_PROCESSES)
 
     after = states()
     if isinstance(after, Breakdown):
         return ""
     if differ(states(0), after[0]):
-        return OF_PROCESS
+        return ANOTHER_PROCESS
     return AFTER_SIMILAR if any(differ(states(number), after[number]) for number in range(1, len(after))) else ""
 
 

@@ -213,18 +213,18 @@ def symptoms(probe: Probe, motion: Trajectory) -> Iterator[str]:
         yield "the body stops: the engine puts it to sleep"
         return
     elif probe.scene.gravity is None:
-        yield from _of_flight(probe, rows[probe.rows], exact)
+        yield from _of_flight(probe.scene, rows[probe.rows], exact)
     for (name, unit), error, allowed in zip(QUANTITIES, differences(rows[probe.rows], exact), probe.allowed, strict=True):
         if not error <= allowed:
             yield f"{name} is off by {error:.{min(digits_that_differ(error, allowed), 4)}g} {unit} (allowed: {allowed:g} {unit})"
 
 
-def _of_flight(probe: Probe, states: Array, exact_states: Array) -> Iterator[str]:
+def _of_flight(scene: Scenario, states: Array, exact_states: Array) -> Iterator[str]:
     """Speeds at the end of a motion without gravity and floor; of unequal moments the angular momentum, as the angular speed varies.
 
     Velocities that are wrong beside right positions, or angular velocities beside right attitudes, are not due to damping.
     """
-    scene, end, exact = probe.scene, states[-1], exact_states[-1]
+    end, exact = states[-1], exact_states[-1]
     (position, attitude, *_), inertia = differences(states, exact_states), scene.body.inertia_tensor
     spin = ("angular velocity", "rad/s", end[SPIN], exact[SPIN])
     if np.ptp(np.linalg.eigvalsh(inertia)) > CLEAR * inertia.max():

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.judging.error_budget import ErrorBudget, error_budget, is_sufficient, vector_budget
-from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY
+from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY, Cause
 from dropspin.comparisons.measuring.comparison import Unresolved
 from dropspin.comparisons.measuring.metric import Average, Metric
 from dropspin.comparisons.measuring.tolerances import negligible, rounding
@@ -39,6 +39,8 @@ WORSE = {"unresolved": 1, "model": 2}
 """Causes that are worse than those of an error that vanishes."""
 LARGE_SHARE = 0.5
 """Share of the largest error of all flights above which that of the flights that enough time steps resolve stands for all."""
+LARGE = 0.01
+"""A ratio, such as an error of restitution, that may let a body leave the flights of the exact solution."""
 DESYNCHRONISED = 0.5
 """Position error, relative to the drop height, at which a bouncing body is in another flight, so that its position error has no meaning."""
 
@@ -144,6 +146,24 @@ def beside_recording(result: Convergence, uncertainty: float) -> Convergence:
     elif math.isnan(budget.asymptotic_error) or budget.cause == "unresolved":
         reason = budget.reason
     return replace(result, budget=ErrorBudget(cause, reason, budget.asymptotic_error, lower, upper))
+
+
+def of_jump(found: Convergence, others: Sequence[tuple[Metric, Cause, Sequence[SeriesPoint]]]) -> Convergence:
+    """The convergence of a metric that jumps, and may stay at a value at all time steps while the error that causes it falls.
+
+    Its model error is unresolved if no other metric has one, and another one has a large error that may vanish.
+
+    Args:
+        found: The convergence, with a model error.
+        others: The other metrics, the causes of their errors, and the errors at each time step.
+    """
+    causes = {cause for _, cause, _ in others}
+    falling = [points for metric, cause, points in others if metric.unit == "1" and cause in ("discretisation", "unresolved")]
+    may_vanish = any(abs(min(points, key=lambda point: point.dt).average.value) > LARGE for points in falling)
+    if {"model", "setting"} & causes or not may_vanish:
+        return found
+    reason = "stays at its value at these time steps, from which it may jump: no other error is one of the model, and a large one falls"
+    return replace(found, budget=replace(found.budget, cause="unresolved", reason=reason, lower=min(found.budget.lower, 0.0)))
 
 
 def _corrected(length: ErrorBudget, vector: ErrorBudget, finest: float) -> ErrorBudget:

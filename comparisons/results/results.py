@@ -236,7 +236,7 @@ def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
     """
     of, reach = ["scene", "engine", "metric"], rows[["lower", "upper"]].abs().max(axis=1)
     errors = rows[rows["kind"].isin(["truth", "invariant"])].sort_values("dt", ascending=False)
-    sizes = errors["value"].abs().where(lambda size: size > NEGLIGIBLE, 0.0)
+    sizes = errors["value"].abs().where(lambda size: ~(size <= NEGLIGIBLE), 0.0)
     rises = (sizes > RISEN) & (sizes > sizes.groupby([errors[name] for name in of]).shift())
     ever = rises.groupby([errors[name] for name in of]).transform("any")
     finest = errors.assign(is_rounded=(sizes == 0.0) & ~ever).drop_duplicates(of, keep="last")

@@ -19,6 +19,7 @@ from dropspin.comparisons.judging.convergence import (
     SeriesPoint,
     beside_recording,
     convergence,
+    of_jump,
 )
 from dropspin.comparisons.judging.judge import judge, judge_asymptotic_error, judge_order
 from dropspin.comparisons.judging.verdicts import FAILURES, Judgement
@@ -38,6 +39,7 @@ from dropspin.comparisons.running.progress import OnProgress, Progress
 from dropspin.comparisons.running.recording import Breakdown, divergence
 from dropspin.comparisons.running.start_phases import StartPhase, compare, measure, phases_at
 from dropspin.comparisons.running.timing import Timing
+from dropspin.scenarios.text import with_few_digits
 
 VANISHING = 0.5
 """Share of an error below which what may remain of it with finer options counts as nothing, as in an error budget."""
@@ -218,8 +220,7 @@ class EngineStudy:
             4. refined      an error that does not vanish with the time step alone, but together with the options that set the accuracy of
                             the engine, is attributed to these options
             5. calibrated   a model error is a setting error if the engine with calibrated settings has none or a smaller one
-            6. jumping      a metric that jumps from flight to flight has a model error only if another one has, because it may stay at a
-                            value while the error that causes it falls slowly
+            6. jumping      a metric that jumps from flight to flight may stay at a value while the error that causes it falls: `of_jump`
 
         Returns:
             The convergence that counts, with its cause.
@@ -248,17 +249,11 @@ class EngineStudy:
             calibrated = self.calibrated.cause(name).budget
             if max(-calibrated.lower, calibrated.upper) < max(found.budget.lower, -found.budget.upper):
                 found = replace(found, budget=replace(found.budget, cause="setting"))
-        if name in JUMPING and found.budget.cause == "model" and not self._is_wrong_elsewhere():
-            budget = found.budget
-            reason = "stays at its value at these time steps, from which it may jump; no other error of this scene is one of the model"
-            found = replace(found, budget=replace(budget, cause="unresolved", reason=reason, lower=min(budget.lower, 0.0)))
+        if name in JUMPING and found.budget.cause == "model":
+            others = {other: self.cause(other).budget.cause for other in self.series if other != name}
+            found = of_jump(found, [(METRICS[other], cause, self.series[other]) for other, cause in others.items()])
         self.causes[name] = found
         return found
-
-    def _is_wrong_elsewhere(self) -> bool:
-        """Whether an error that changes with a power of the time step is one of the model or the settings."""
-        others = (other for other in self.series if other not in JUMPING and METRICS[other].kind == "truth")
-        return any(self.cause(other).budget.cause in ("model", "setting") for other in others)
 
     def _longer(self, metric: Metric, added: Sequence[float]) -> Convergence | None:
         """The convergence over the requested and other time steps; None if the engine gives no result at these."""
@@ -271,7 +266,7 @@ class EngineStudy:
         """The convergence, of which the cause may be the options that set the accuracy: they are refined together with the time step."""
         options = self.entry.adapter.accuracy
         names = " and ".join(options)
-        values = [", ".join(_short(finer.option(option)) for _, finer in refined) for option in options]
+        values = [", ".join(with_few_digits(finer.option(option)) for _, finer in refined) for option in options]
         path = f"{'; '.join(values)}, with dt = {', '.join(f'{dt:g}' for dt, _ in refined)} s"
         points = self._points(metric, [(dt, engine_entry(finer)) for dt, finer in refined])
         budget = replace(found.budget, cause="unresolved", reason=f"too few usable time steps with finer {names}")
@@ -300,11 +295,3 @@ class EngineStudy:
 def _claim(run: EngineRun) -> Claim:
     """The properties that an engine declares, and the limitations that it met in a run."""
     return Claim(run.label, run.order, run.precision, tuple(run.limitations))
-
-
-def _short(value: str) -> str:
-    """An option's value; numbers with six digits."""
-    try:
-        return f"{float(value):g}"
-    except ValueError:
-        return value

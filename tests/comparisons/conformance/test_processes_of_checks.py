@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import engines as made
 
-from dropspin.comparisons.conformance.checks import AFTER_OTHERS, AFTER_SIMILAR, OF_PROCESS, conform
+from dropspin.comparisons.conformance.checks import AFTER_OTHERS, AFTER_SIMILAR, ANOTHER_PROCESS, conform
 
 pytestmark = pytest.mark.usefixtures("engine_processes")
 
@@ -53,7 +53,7 @@ class ByProcess(made.Exact):
         return made.ExactSimulation(scene, dt, lambda row, time: row + push * np.eye(13)[0])
 
 
-@pytest.mark.parametrize(("engine", "message"), [(Raising, AFTER_SIMILAR), (ByProcess, OF_PROCESS)])
+@pytest.mark.parametrize(("engine", "message"), [(Raising, AFTER_SIMILAR), (ByProcess, ANOTHER_PROCESS)])
 def test_other_kinds_of_state_are_found(engine, message):
     """An exception after a similar scene; a motion that depends on the process is not said to depend on other scenes."""
     [found] = conform(engine(), ["repeats"])

@@ -38,7 +38,7 @@ MEANINGS = {
     "not judged (missing)": "the engine is not installed",
 }
 """What each status of an engine in a scene means; the status is the worst over all metrics and time steps."""
-CHOICE = "Error: the largest known fault, limitation or failure, else the leading metric."
+CHOICE = "Error: one metric for a row, that of its largest fault, else the leading metric."
 """Which error a row of the matrix shows."""
 
 

@@ -216,11 +216,9 @@ class BodyText:
             return
         model, elements = self._file.model, [geom for geom in self.element.every("geom") if _body_of(geom) is self.element]
         geoms = np.flatnonzero(model.geom_bodyid == self._head)
-        is_same = len(geoms) == len(elements)
-        visual = [
-            one for geom, one in zip(geoms, elements, strict=is_same) if not (model.geom_contype[geom] or model.geom_conaffinity[geom])
-        ]
-        words = visual[0].words if visual and is_same else Setting("geometries that collide with nothing")
+        pairs = zip(geoms, elements, strict=True) if len(geoms) == len(elements) else ()
+        visual = [element for geom, element in pairs if not (model.geom_contype[geom] or model.geom_conaffinity[geom])]
+        words = visual[0].words if visual else Setting("geometries that collide with nothing")
         yield "visual", words, f"counted in the mass with {has.mass - least.mass:.4g} kg, by density, although it collides with nothing"
 
     def _changed(self, name: str, made: str) -> tuple[str, Setting, str]:

@@ -61,7 +61,7 @@ class Agreement(NamedTuple):
 
     Attributes:
         here: The value, to the digits of the source.
-        difference: The value less the printed one, or less the bound.
+        difference: The value minus the printed one, or minus the bound.
         agrees: Whether the digits are equal, or the value is within the bound or the tolerance that the source states.
     """
 

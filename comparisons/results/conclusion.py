@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from dropspin.comparisons.judging.convergence import JUMPING
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.results.results import Results, relative_sizes
 from dropspin.scenarios import Scenario
@@ -91,7 +92,7 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     sizes = np.array(relative_sizes(errors, results.scenes))
     uncertain = np.array(relative_sizes(errors.assign(value=errors["tolerance"].fillna(0.0)), results.scenes))
     states = np.select([sizes + uncertain <= within, sizes - uncertain > within], ["within", "beyond"], "undecided")
-    lost = table[(table["metric"] == "desync_rate") & (table["kind"] == "asymptotic_error") & (table["verdict"] == "failed")]
+    lost = table[table["metric"].isin(JUMPING) & (table["kind"] == "asymptotic_error") & (table["verdict"] == "failed")]
     pair = ["scene", "engine"]
     is_lost = pd.MultiIndex.from_frame(errors[pair]).isin(pd.MultiIndex.from_frame(lost[pair])) & (errors["metric"] != "position_error")
     states = np.where(is_lost & (states == "within"), "undecided", states)

@@ -236,11 +236,10 @@ def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
     """
     of, reach = ["scene", "engine", "metric"], rows[["lower", "upper"]].abs().max(axis=1)
     errors = rows[rows["kind"].isin(["truth", "invariant"])].sort_values("dt", ascending=False)
-    sizes = errors["value"].abs().where(lambda size: ~(size <= NEGLIGIBLE), 0.0)
-    rises = (sizes > RISEN) & (sizes > sizes.groupby([errors[name] for name in of]).shift())
-    ever = rises.groupby([errors[name] for name in of]).transform("any")
-    finest = errors.assign(is_rounded=(sizes == 0.0) & ~ever).drop_duplicates(of, keep="last")
-    rounded = pd.MultiIndex.from_frame(finest.loc[finest["is_rounded"], of])
+    errors = errors.assign(size=errors["value"].abs().where(lambda size: ~(size <= NEGLIGIBLE), 0.0))
+    errors["rises"] = (errors["size"] > RISEN) & (errors["size"] > errors.groupby(of)["size"].shift())
+    rises, finest = errors.groupby(of)["rises"].any(), errors.drop_duplicates(of, keep="last").set_index(of)["size"]
+    rounded = finest.index[(finest == 0.0) & ~rises.reindex(finest.index)]
     is_open = (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & (reach > SMALLEST_STATED)
     return is_open & ~pd.MultiIndex.from_frame(rows[of]).isin(rounded)
 

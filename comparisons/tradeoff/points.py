@@ -170,12 +170,9 @@ class TradeOff:
 
     def _within(self, within: float) -> list[CostPoint]:
         """The configurations within a tolerance, with those of the same engine at all finer time steps."""
-        tried = [(ladder.engine, dt, error) for ladder in self.ladders for dt, error in ladder.completed]
-        finest: dict[str, float] = {}  # step at which an engine exceeds the tolerance, or has no finite error
-        for engine, dt, error in tried:
-            if not error <= within:
-                finest[engine] = min(dt, finest.get(engine, math.inf))
-        return [point for point in self.points if point.error <= within and point.dt < finest.get(point.engine, math.inf)]
+        exceeding = {ladder.engine: [dt for dt, error in ladder.completed if not error <= within] for ladder in self.ladders}
+        finest = {engine: min(dts, default=math.inf) for engine, dts in exceeding.items()}
+        return [point for point in self.points if point.error <= within and point.dt < finest[point.engine]]
 
 
 def _pareto_front(points: Sequence[CostPoint], cost: Callable[[CostPoint], float]) -> list[CostPoint]:

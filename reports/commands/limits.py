@@ -45,13 +45,14 @@ def limits_command(scenes: tuple[str, ...], axes: tuple[str, ...], output: str, 
     loaded = [load(name) for name in scenes or SCENES]
     if len({scene.name for scene in loaded}) < len(loaded):
         raise click.UsageError("a scene is given twice, or two files have the same name; give each scene once, or rename a file.")
-    own = {scene.name: [name for name in axes if name not in AXES or AXES[name].applies(scene)] for scene in loaded}
-    if len(loaded) == 1 or not any(own.values()):  # the error of find_limits lists the axes of a scene
-        own = {scene.name: list(axes) for scene in loaded}
-    without = {name: f"it has no axis {' or '.join(axis for axis in axes if axis not in having)}" for name, having in own.items()}
+    lacking = {scene.name: [name for name in axes if name in AXES and not AXES[name].applies(scene)] for scene in loaded}
+    if len(loaded) == 1 or all(len(names) == len(axes) for names in lacking.values()):
+        lacking = {name: [] for name in lacking}  # the error of find_limits lists the axes of a scene
     results = []
     with written_study(output, json_output) as keep:
-        for scene in (scene for scene in loaded if own[scene.name] or not axes):
-            with share_bar(scene.name) as on_progress:
-                results.append(find_limits(scene, axes=own[scene.name], **options, on_progress=on_progress))
-        keep(Limits(scenes=results, left_out={name: why for name, why in without.items() if len(own[name]) < len(axes)}))
+        for scene in loaded:
+            own = [name for name in axes if name not in lacking[scene.name]]
+            if own or not axes:
+                with share_bar(scene.name) as on_progress:
+                    results.append(find_limits(scene, axes=own, **options, on_progress=on_progress))
+        keep(Limits(scenes=results, left_out={name: f"it has no axis {' or '.join(names)}" for name, names in lacking.items() if names}))

@@ -22,7 +22,7 @@ COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterio
 
 
 class Limits(Study):
-    """The results of `dropspin limits` in each scene, and the scenes that have none of the axes."""
+    """The results of `dropspin limits` in each scene, and which scenes lack an axis."""
 
     study: Literal["limits"] = "limits"
     scenes: list[RobustnessStudy]

@@ -26,6 +26,7 @@ from dropspin.comparisons.running.run import run
 from dropspin.comparisons.running.timing import time_steps
 from dropspin.scenarios import load
 from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.model import Gravity
 
 PAGE = Path(__file__).parents[3] / "docs" / "bring-your-engine.md"
 ADAPTER = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1]
@@ -351,6 +352,16 @@ def test_restitution_is_checked_at_several_values(change, checks):
     assert set(not_passed(with_scene(changed), "dull ball", "bouncing ball", "lively ball")) == checks
 
 
+@pytest.mark.parametrize(("is_dead", "check"), [(lambda mass: mass < 1.0, "light ball"), (lambda mass: mass > 100.0, "heavy ball")])
+def test_restitution_is_checked_for_light_and_heavy_balls(is_dead, check):
+    def changed(scene):
+        return floor(restitution=0.0)(scene) if scene.floor is not None and is_dead(scene.body.mass) else scene
+
+    found = not_passed(with_scene(changed), "bouncing ball", "light ball", "heavy ball")
+    assert list(found) == [check]
+    assert "instead of 0.6 (100 % too low)" in found[check][1]
+
+
 @pytest.mark.usefixtures("without_explanations")
 def test_known_limitation_explains_errors_within_its_numbers_only():
     """In `conform` and in a run; a sentence alone explains no error."""
@@ -662,6 +673,22 @@ def test_leapfrog_with_velocities_of_half_a_step_before_has_that_velocity_lag():
     assert check_velocity_lag(staggered(0.5)) == "velocity lags position by 0.5 steps"
     with pytest.raises(CheckFailed, match=r"velocity_lag is 0 steps, but velocity lags position by 0\.5 steps"):
         check_velocity_lag(staggered(0.0))
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.01])
+def test_lag_of_a_fall_with_another_gravity_is_that_of_the_scheme(factor):
+    """The lag of semi-implicit Euler is half a step whatever the acceleration."""
+
+    def prepare(self, scene, dt):
+        weaker = scene.model_copy(update={"gravity": Gravity(acceleration=tuple(factor * scene.acceleration))})
+        return Leapfrog(weaker, dt, 0.5)
+
+    engine = type("Weak", (made.Exact,), {"prepare": prepare})()
+    if factor > 0.1:
+        assert check_velocity_lag(engine) == "velocity lags position by 0.5 steps"
+    else:
+        with pytest.raises(CheckFailed, match="the velocity of a falling body hardly changes"):
+            check_velocity_lag(engine)
 
 
 def test_rounding_of_single_precision_does_not_change_the_velocity_lag():

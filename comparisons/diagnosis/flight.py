@@ -29,7 +29,7 @@ def fall(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The distance fallen in a second, and the terminal speed."""
     facts = body.facts
     if not facts.gravity > 0.0:
-        return []
+        return [Answer("fall", "gravity", "", detail="none")]
     start, fallen, exact = facts.start(), [], []
     for dt in dts:
         steps = round(FALL / dt)

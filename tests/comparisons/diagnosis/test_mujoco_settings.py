@@ -181,6 +181,12 @@ def test_stiffness_and_the_direction_of_gravity_are_left_out_and_named(tmp_path)
         assert facts.lands == (angle < 90)
 
 
+@pytest.mark.parametrize(("head", "option"), [('<option><flag gravity="disable"/></option>', ""), ("", 'gravity="0 0 0"')])
+def test_absence_of_gravity_is_stated(tmp_path, head, option):
+    [answer] = fall(body_of(tmp_path, FREE.format(BOX), option, head=head), [0.002])
+    assert (answer.quantity, answer.detail, answer.findings) == ("gravity", "none", ())
+
+
 def test_start_inside_the_floor_is_named(tmp_path):
     world = FREE.replace('pos="0 0 1"', 'pos=".3 0 {}" euler="0 90 0"').replace("{}</body>", BOX + "</body>")
     sunk = body_of(tmp_path, world.format(HALF[0] - 0.02))

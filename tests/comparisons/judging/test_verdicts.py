@@ -119,6 +119,21 @@ def test_model_error_is_known_if_its_interval_meets_the_expected_one(cause, inte
     assert judged(scene_that_expects(FAULT), "mine").verdict != "known"
 
 
+@pytest.mark.parametrize(("sign", "smallest", "expected"), [(1.0, 0.1, "known"), (-1.0, 0.1, "known"), (1.0, -0.1, "passed")])
+def test_value_within_bounds_that_exclude_0_is_known_if_the_asymptotic_error_is(sign, smallest, expected):
+    """The fault is expected by name at the finest time step alone; at the coarser one the bounds of all engines apply."""
+
+    def within(least, most, **other):
+        return {"metric": "energy_error", "within": sorted([sign * least, sign * most])} | other
+
+    scene = scene_that_expects(within(smallest, 0.4), within(0.2, 0.45, engine="faulty", dt=1e-3))
+    point = SeriesPoint(2e-3, 500, Average(*np.full((3, 1), 0.25 * sign)), None, 0.0)
+    interval = sorted([0.24 * sign, 0.26 * sign])
+    claim, limit = Claim("faulty", None, np.float64), Convergence(ErrorBudget("model", "extrapolated", 0.25 * sign, *interval), 1e-3)
+    assert judge(scene, None, claim, METRICS["energy_error"], point, limit).verdict == expected
+    assert judge(scene, None, claim, METRICS["energy_error"], point).verdict == "passed"
+
+
 def test_equally_narrow_expectations_both_bind():
     """The tighter bound of each side counts."""
     scene = scene_that_expects({"metric": "energy_error", "below": 4}, {"metric": "energy_error", "within": [-9, 1]})

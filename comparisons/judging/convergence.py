@@ -1,11 +1,12 @@
 """Convergence over several time steps: the error budget of a metric, corrected by that of its components.
 
-The error at each step is the average over start phases of the flight in which it is largest at the finest step; steps that do not resolve
-this flight have none. Of a metric with two signs, both are judged: one may vanish where the other remains.
+The error at each step is the average over start phases of one flight; steps that do not resolve this flight have none. The flight in which
+the error is largest at the finest step counts, or a worse one. Of a metric with two signs, both are judged: one may vanish where the other
+remains.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -43,6 +44,11 @@ LARGE = 0.01
 """A ratio, such as an error of restitution, that may let a body leave the flights of the exact solution."""
 DESYNCHRONISED = 0.5
 """Position error, relative to the drop height, at which a bouncing body is in another flight, so that its position error has no meaning."""
+
+Part = tuple[int, ...]
+"""A flight, and of a metric with two signs the largest or the smallest value in it."""
+Judged = tuple[ErrorBudget, Array]
+"""The budget of a part, and its error at each time step."""
 
 
 class Claim(NamedTuple):
@@ -88,6 +94,7 @@ class Convergence:
         order_tolerance: The change of the order if each error to which it is fitted changes by its tolerance.
         is_open: Whether more time steps may decide the cause.
         remark: Which time steps or options were added to the requested ones.
+        finest_error: The error at the finest time step; NaN if it is not resolved.
     """
 
     budget: ErrorBudget
@@ -95,6 +102,7 @@ class Convergence:
     order_tolerance: float = math.nan
     is_open: bool = False
     remark: str = ""
+    finest_error: float = math.nan
 
 
 def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint], remark: str = "") -> Convergence:
@@ -109,15 +117,18 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     """
     dts, floor = np.array([point.dt for point in series]), negligible(scene, metric.unit)
     rounded = rounding(scene, metric.unit, claim.precision, np.array([point.steps for point in series], dtype=float))
-    judged = []
-    for errors, resolutions in _worst_parts(scene, metric, series):
+
+    def judged(part: Part) -> Judged:
+        errors, resolutions = _errors_of(scene, metric, series, part)
         chance = 0.0
         if metric.name in JUMPING:  # the step changes it by chance, as far as it has changed it at all
             chance = float(np.nanmax(errors, initial=-math.inf) - np.nanmin(errors, initial=math.inf))
         noise = STANDARD_DEVIATIONS * np.maximum(resolutions, chance)
-        judged.append((error_budget(dts, errors, claim.order, noise, rounded, signed=metric.signed, negligible=floor), errors))
-    length, errors = _worse(judged, floor)
-    vector = _budget_of_components(scene, claim, metric, series, np.isfinite(errors), rounded)
+        return error_budget(dts, errors, claim.order, noise, rounded, signed=metric.signed, negligible=floor), errors
+
+    length, errors = _worst(series, judged, floor)
+    has_value = not math.isnan(length.asymptotic_error)
+    vector = _budget_of_components(scene, claim, metric, series, np.isfinite(errors), rounded) if has_value else None
     budget = length if vector is None else _corrected(length, vector, finest=abs(float(errors[np.argmin(dts)])))
     order_tolerance = math.nan
     if budget.dts and metric.name not in JUMPING:
@@ -126,8 +137,9 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
         shares = np.array([point.tolerance for point in series])[used] / np.abs(errors[used])
         order_tolerance = float(np.sum(np.abs(logs) * shares) / np.sum(logs**2))
     deciding = budget if vector is None or budget.cause != "discretisation" else vector
-    is_open = deciding.cause == "unresolved" and not math.isnan(budget.asymptotic_error) and float(np.nanmax(np.abs(errors))) > floor
-    return Convergence(budget, float(np.min(dts)), order_tolerance, is_open, remark)
+    is_open = deciding.cause == "unresolved" and has_value and float(np.nanmax(np.abs(errors))) > floor
+    finest = min(series, key=lambda point: point.dt)
+    return Convergence(budget, finest.dt, order_tolerance, is_open, remark, finest.average.value)
 
 
 def beside_recording(result: Convergence, uncertainty: float) -> Convergence:
@@ -179,46 +191,72 @@ def _corrected(length: ErrorBudget, vector: ErrorBudget, finest: float) -> Error
     return length if length.cause == "model" else replace(length, upper=max(length.upper, vector.upper))
 
 
-def _worse(judged: Sequence[tuple[ErrorBudget, Array]], floor: float) -> tuple[ErrorBudget, Array]:
-    """The budget of the sign that is largest at the finest step, or of the other one if that is worse and more of it may remain.
+def _worst(series: Sequence[SeriesPoint], judged: Callable[[Part], Judged], floor: float) -> Judged:
+    """The worst of the flights in which the error is largest at a time step, or one whose smaller error remains where theirs vanish."""
+    largest, others = _worst_parts(series)
+    worst = judged(largest[0])
+    for part in largest[1:]:
+        worst = _worse(worst, judged(part), floor)
+    for part, size in others.items():
+        if worst[0].cause != "model" and size > max(_reach(worst[0]), floor):
+            other = judged(part)
+            worst = _worse(worst, other, floor) if other[0].cause == "model" else worst
+    return worst
 
-    The interval of an unresolved one contains that of the other sign, because either may be the larger one as dt → 0.
+
+def _worse(largest: Judged, other: Judged, floor: float) -> Judged:
+    """The budget of the part that is largest at the finest step, or that of another one if it is worse and more of it may remain.
+
+    The interval of an unresolved one contains that of the other part, because either may be the larger one as dt → 0.
     """
-    if len(judged) == 1:
-        return judged[0]
-    (largest, _), (other, _) = judged
-    may_remain = max(-other.lower, other.upper) > max(-largest.lower, largest.upper, floor)
-    if may_remain and WORSE.get(other.cause, 0) > WORSE.get(largest.cause, 0):
-        judged = judged[::-1]
-    (worse, errors), (other, _) = judged
-    if worse.cause == "unresolved" and not math.isnan(other.lower):
-        worse = replace(worse, lower=min(worse.lower, other.lower), upper=max(worse.upper, other.upper))
+    may_remain = _reach(other[0]) > max(_reach(largest[0]), floor)
+    if may_remain and WORSE.get(other[0].cause, 0) > WORSE.get(largest[0].cause, 0):
+        largest, other = other, largest
+    (worse, errors), (second, _) = largest, other
+    if worse.cause == "unresolved" and not math.isnan(second.lower):
+        worse = replace(worse, lower=min(worse.lower, second.lower), upper=max(worse.upper, second.upper))
     return worse, errors
 
 
-def _worst_parts(scene: Scenario, metric: Metric, series: Sequence[SeriesPoint]) -> list[tuple[Array, Array]]:
-    """Errors and their resolution in the flight in which they are largest at the finest time step: of that sign, and of the other one.
+def _reach(budget: ErrorBudget) -> float:
+    return max(-budget.lower, budget.upper)
+
+
+def _worst_parts(series: Sequence[SeriesPoint]) -> tuple[list[Part], dict[Part, float]]:
+    """The parts in which errors are largest: at the finest time step first, then at others; and the sizes there of all other parts.
 
     Flights that too few of the steps resolve count only if their error is far larger than that of the others.
     """
-    resolved = [point for point in series if np.isfinite(point.average.parts).all()]
-    finest = min(resolved or series, key=lambda point: point.dt).average.parts
+    resolved = sorted((point for point in series if np.isfinite(point.average.parts).all()), key=lambda point: point.dt)
+    finest = (resolved or sorted(series, key=lambda point: point.dt))[0].average.parts
     sizes, dts = np.abs(finest), [[point.dt for point in resolved if len(point.average.parts) > flight] for flight in range(len(finest))]
     of_enough = sizes[: sum(map(is_sufficient, dts))]
-    among = of_enough if of_enough.max(initial=0.0) > LARGE_SHARE * sizes.max() else sizes
-    flight, *sign = map(int, np.unravel_index(np.argmax(among), among.shape))
-    found = []
-    for part in [(flight, *sign), *((flight, other) for side in sign for other in range(finest.shape[1]) if other != side)]:
-        errors, resolutions = (
-            np.array([values[part] if values.ndim == finest.ndim and len(values) > flight else math.nan for values in both])
-            for both in zip(*(point.average[:2] for point in series), strict=True)
-        )
-        if metric.unit == "rad":
-            errors[np.abs(errors) > SATURATION] = math.nan
-        if metric.name == "position_error" and scene.starts_above_floor and scene.recording is None:
-            errors[np.abs(errors) > DESYNCHRONISED * scene.clearance] = math.nan
-        found.append((errors, resolutions))
-    return found
+    if not of_enough.max(initial=0.0) > LARGE_SHARE * sizes.max():
+        return _with_other_sign(_largest(sizes), finest), {}
+    alike = [np.abs(point.average.parts[: len(of_enough)]) for point in resolved if point.average.parts.ndim == finest.ndim]
+    largest = list(dict.fromkeys(part for sizes in [of_enough, *alike] for part in _with_other_sign(_largest(sizes), finest)))
+    return largest, {part: float(of_enough[part]) for part in np.ndindex(of_enough.shape) if part not in largest}
+
+
+def _largest(sizes: Array) -> Part:
+    return tuple(map(int, np.unravel_index(np.argmax(sizes), sizes.shape)))
+
+
+def _with_other_sign(part: Part, parts: Array) -> list[Part]:
+    return [part, *((part[0], side) for side in range(parts.shape[1]) if side != part[1])] if parts.ndim > 1 else [part]
+
+
+def _errors_of(scene: Scenario, metric: Metric, series: Sequence[SeriesPoint], part: Part) -> tuple[Array, Array]:
+    """Errors and their resolution in one flight, with one sign; NaN where a time step does not resolve it, or the error saturates."""
+    errors, resolutions = (
+        np.array([values[part] if values.ndim == len(part) and len(values) > part[0] else math.nan for values in both])
+        for both in zip(*(point.average[:2] for point in series), strict=True)
+    )
+    if metric.unit == "rad":
+        errors[np.abs(errors) > SATURATION] = math.nan
+    if metric.name == "position_error" and scene.starts_above_floor and scene.recording is None:
+        errors[np.abs(errors) > DESYNCHRONISED * scene.clearance] = math.nan
+    return errors, resolutions
 
 
 def _budget_of_components(

@@ -29,6 +29,7 @@ from dropspin.comparisons.judging.series import (
     ABOVE_NOISE,
     FEWEST_TIME_STEPS,
     SMALLEST_RATIO,
+    falls_ever_faster,
     fitted_order,
     is_clear_power,
     most_informative,
@@ -59,6 +60,7 @@ WIDEST_ORDER = 2.0
 """An order with a wider interval is not stated: the interval would contain three whole numbers."""
 
 SLOW = f"changes more slowly than dt^{ORDERS[0]:g}, too slowly to be extrapolated; much finer time steps are needed"
+EARLY = "falls faster at each finer time step, as an error that is as large as it can be does at coarse ones; finer time steps are needed"
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ def error_budget(
         dts: Time steps [s], shape (n,), in any order. If more than five are usable, the five smallest are used; if these span less than a
             factor of 16, the five that are spaced most evenly.
         errors: The error at each time step, shape (n,), in any unit, with its sign if it has one; NaN if the time step is too large to
-            resolve it.
+            resolve it. If the finest one is not finite, the cause is unresolved.
         claimed_order: The order of accuracy that is claimed for the method; None or inf if no order is claimed.
         resolution: Standard deviation of the sampling noise of each error, shape (n,), or one for all, in the unit of the errors. Use 0 if
             the error does not depend on when within a time step an impact occurs. Use None if each error comes from a single initial state;
@@ -149,6 +151,8 @@ def error_budget(
     verify_options(e, claimed_order, signed, negligible, judged_together)
     coarsest_first = np.argsort(-h)
     usable = coarsest_first[np.isfinite(e[coarsest_first])]
+    if len(usable) and usable[-1] != coarsest_first[-1]:  # what coarser steps tell of dt → 0, the finest one contradicts
+        return ErrorBudget("unresolved", "the error at the finest time step is not usable, but those at coarser ones are")
     if not is_sufficient(list(h[usable])):
         return ErrorBudget("unresolved", _why_insufficient(h[usable], len(h)))
     used = usable[most_informative(h[usable])]
@@ -166,11 +170,12 @@ def error_budget(
     cause, limit = _attributed(h, e, posterior, negligible, float(noise[-1]), judged_together)
     order, fitted = fitted_order(h, e if cause == "discretisation" else e - limit[0], small)
     is_slow = cause == "model" and order < ORDERS[0] and max(limit[1], -limit[2]) < abs(float(e[-1]) - limit[0])
-    if is_slow:
+    is_early = cause == "model" and abs(limit[0]) <= abs(float(e[-1])) and falls_ever_faster(h, e, small)
+    if is_slow or is_early:
         cause, limit = "unresolved", (limit[0], min(limit[1], 0.0), max(limit[2], 0.0))
     in_units = unit * limit[0], unit * limit[1], unit * limit[2]
     if cause == "unresolved":
-        return ErrorBudget(cause, SLOW if is_slow else _why_unresolved(e, noise, floor), *in_units)
+        return ErrorBudget(cause, EARLY if is_early else SLOW if is_slow else _why_unresolved(e, noise, floor), *in_units)
     has_order = not math.isnan(order)
     orders = (min(posterior.order_lower, order), max(posterior.order_upper, order)) if has_order else (math.nan, math.nan)
     power = f" as dt^{order:.2f} ({orders[0]:.2f} to {orders[1]:.2f})" if is_determined(*orders) else ""

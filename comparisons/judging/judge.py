@@ -80,14 +80,16 @@ def judge(
 
 
 def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, convergence: Convergence) -> Judgement | None:
-    """Judge an asymptotic error; None if the time steps give none. The difference from a recording that remains is `measured`.
+    """Judge an asymptotic error; None if the time steps give none of an error that is negligible or not resolved at the finest one.
+
+    The difference from a recording that remains is `measured`.
 
     A model error or a setting error is `known` if an expectation for this engine at its finest time step allows values of its interval,
     `limited` if a known limitation explains an error as small as the nearer end of the interval, and fails otherwise. An unresolved one is
     `measured`. A vanishing error passes, also where a known fault is expected at a time step: whether that fault occurs is judged there.
     """
     budget = convergence.budget
-    if math.isnan(budget.asymptotic_error):
+    if math.isnan(budget.asymptotic_error) and not abs(convergence.finest_error) > negligible(scene, metric.unit):
         return None
     verdict: Verdict = "measured" if budget.cause == "unresolved" else "passed"
     reason = budget.reason

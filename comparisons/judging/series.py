@@ -23,6 +23,8 @@ SAME_SLOPE = 0.5
 """Slopes between neighbouring time steps that differ by less than this count as one power of the time step."""
 BY_CHANCE = 1e-3
 """Errors within rounding follow a power of the time step if independent errors look like it with less than this probability."""
+NOTICEABLE = 1e-3
+"""Share of an error that its change from one time step to the next must exceed to tell its trend."""
 TWO_DIGITS = 0.01
 """Logarithms of errors that differ by less than this are equal, because errors near rounding have few digits."""
 
@@ -104,6 +106,18 @@ def is_clear_power(h: Array, e: Array) -> bool:
     off_line = y[1:-1] - y[:-2] - (y[2:] - y[:-2]) * (x[1:-1] - x[:-2]) / (x[2:] - x[:-2])
     chance = max(float(np.max(np.abs(off_line))), TWO_DIGITS) ** len(off_line) * math.exp(y[-1] - y[0])
     return bool(np.min(slopes) > 0.5 * ORDERS[0] and chance < BY_CHANCE)
+
+
+def falls_ever_faster(h: Array, e: Array, small: Array) -> bool:
+    """Whether errors, coarsest first, fall toward finer steps by more for each factor of the step: they have not begun to converge.
+
+    An error that is at most as large as it can be does so while it leaves that size, and may still vanish. The powers of a series that
+    converges do the opposite. The last fall exceeds the noise and `NOTICEABLE` of the error, so that chance does not look like it.
+    """
+    sizes = e * np.sign(e[-1])
+    falls = np.diff(sizes) / np.diff(np.log(h))
+    is_noticeable = sizes[-2] - sizes[-1] > max(NOTICEABLE * sizes[-1], ABOVE_NOISE * small[-1])
+    return bool(is_noticeable and (falls >= 0.0).all() and (np.diff(falls) > 0.0).all())
 
 
 def fitted_order(h: Array, rest: Array, small: Array) -> tuple[float, tuple[float, ...]]:

@@ -82,7 +82,7 @@ class Metric:
         # The phases are even at the first impact only; at later ones they are correlated, hardly better than one draw.
         later = 2 if flights > 1 or self.first_flight or len(cases[0].impacts) < 2 else 0
         resolutions[later:] = phases[:, later:].std(axis=0)
-        if len(cases) == 1 and any(impact > cases[0].dt for impact in cases[0].impacts[:1]):
+        if len(cases) == 1 and any(impact > 0.0 for impact in cases[0].impacts[:1]):
             resolutions = np.abs(phases[0])  # of a single start, the whole value may depend on where in a step its first impact falls
         ranges = np.ptp(phases, axis=0)
         if cases[0].measured is not None and len(cases) > 1:

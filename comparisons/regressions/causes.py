@@ -131,7 +131,8 @@ def _explained(scene: Scenario, fault: FaultModel, rows: list[dict[Hashable, Any
         lower = row["lower"] - sampling
         if not fine.is_whole:  # the largest error so far is a lower bound of the whole one
             lower, caused = (-np.inf, -np.inf if METRICS[metric].signed else caused)
-        if not lower <= caused <= row["upper"] + sampling:
+        has_none = row["verdict"] == "failed" and abs(caused) <= sampling  # as it has of an error whose interval begins at 0
+        if has_none or not lower <= caused <= row["upper"] + sampling:
             return None
         count += fine.is_whole and row["verdict"] == "failed"
     return count

@@ -230,7 +230,7 @@ def relative_sizes(rows: pd.DataFrame, scenes: Mapping[str, Scenario]) -> list[f
 
 
 def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
-    """Which rows are asymptotic errors whose interval contains 0 and values that are not negligible, so that no cause is stated.
+    """Which rows are asymptotic errors whose interval contains 0 and values that are not negligible, or is unknown: no cause is stated.
 
     An error within rounding at the finest time step is not undecided, unless it rises from one time step to a finer one, to more than 0.01.
     """
@@ -240,7 +240,7 @@ def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
     errors["rises"] = (errors["size"] > RISEN) & (errors["size"] > errors.groupby(of)["size"].shift())
     rises, finest = errors.groupby(of)["rises"].any(), errors.drop_duplicates(of, keep="last").set_index(of)["size"]
     rounded = finest.index[(finest == 0.0) & ~rises.reindex(finest.index)]
-    is_open = (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & (reach > SMALLEST_STATED)
+    is_open = (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & ~(reach <= SMALLEST_STATED)
     return is_open & ~pd.MultiIndex.from_frame(rows[of]).isin(rounded)
 
 

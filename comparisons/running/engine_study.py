@@ -214,9 +214,9 @@ class EngineStudy:
             1. requested    the error budget of the requested time steps: `convergence`
             2. coarser      if these leave the cause open, coarser steps are added. Their result counts if the cause was unresolved, or if
                             the model is the cause now
-            3. finer        before a model error in contact fails, a finer step is added, because a contact solver can be unstable above
-                            some time step, which looks like an error that no time step removes. Its result counts unless the model is
-                            still the cause
+            3. finer        before a model error fails, a finer step is added, because a method can be unstable above some time step, or
+                            its error as large as it can be, which looks like an error that no time step removes. Its result counts unless
+                            the model is still the cause
             4. refined      an error that does not vanish with the time step alone, but together with the options that set the accuracy of
                             the engine, is attributed to these options
             5. calibrated   a model error is a setting error if the engine with calibrated settings has none or a smaller one
@@ -238,7 +238,7 @@ class EngineStudy:
             longer = self._longer(metric, [factor * max(dts) for factor in ADDED_STEPS])
             if longer is not None and (found.budget.cause == "unresolved" or longer.budget.cause == "model"):
                 found = longer
-        if found.budget.cause == "model" and scene.floor is not None:
+        if found.budget.cause == "model":
             error = judge_asymptotic_error(scene, self.claim, metric, found)
             longer = self._longer(metric, [min(dts) / 2.0]) if error is not None and error.verdict == "failed" else None
             if longer is not None and longer.budget.cause != "model":

@@ -19,6 +19,7 @@ from dropspin.reports.stories.failures import failure_parts, failures
 from dropspin.reports.terminal.rows import print_document
 from dropspin.scenarios import DropspinError, load
 from dropspin.scenarios.rotations import about, rotate
+from dropspin.scenarios.variations import with_values
 
 STEPS = [8e-3, 4e-3, 2e-3]
 """For engines that are exact but for their fault."""
@@ -128,6 +129,20 @@ def test_known_fault_is_named(title):
         "additional angular damping of 1e-3 1/s in free flight": "angular damping 0.001 1/s too high",
     }
     assert words[title] in consistent_with(TITLED[title], "fall-spin", "spin-asymmetric", "drop-ball-backspin")
+
+
+def test_fault_without_an_effect_is_no_cause():
+    """The interval of the energy error begins at what is negligible, so that a cause without any error is near it."""
+
+    class Approaching(made.Exact):
+        name = "approaching"
+
+        def prepare(self, scene, dt):
+            other = with_values(scene, "floor", restitution=lambda e: e * (1.1 - 100.0 * dt))
+            return made.ExactSimulation(other, dt, lambda row, time: row)
+
+    sentence = consistent_with(Approaching(), "drop-ball", steps=[5e-4, 2.5e-4, 1.25e-4])
+    assert sentence == "Possible cause of the asymptotic errors: restitution 10 % too high."
 
 
 @pytest.mark.extended

@@ -14,10 +14,21 @@ from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, OUTCOMES, VERDICTS, with_reason
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
+from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.results import SMALLEST_STATED, Results, Status, relative_sizes
 from dropspin.reports.plots.colours import in_sentence
 from dropspin.reports.stories.matrix import step_times
-from dropspin.reports.stories.numbers import duration, failing, formatted, in_ms, named, quantity, sized, with_unit
+from dropspin.reports.stories.numbers import (
+    duration,
+    failing,
+    formatted,
+    in_ms,
+    listed,
+    named,
+    quantity,
+    sized,
+    with_unit,
+)
 from dropspin.scenarios.text import counted
 
 if TYPE_CHECKING:
@@ -215,6 +226,21 @@ def beside_recordings(results: Results) -> Iterator[str]:
         if "uncertainty" in finest:
             value = with_unit(f"{formatted(finest['truth'])} ± {formatted(finest['uncertainty'])}", METRICS[metric].unit)
             yield f"{in_sentence(engine)}: the {quantity(metric)} differs from the recording in {scene} by {value}."
+
+
+def ensemble_differences(results: Results) -> Iterator[str]:
+    """For each ensemble, the means in which two engines differ at 95 % confidence at every time step; the values are of the finest one."""
+    pairs = results.agreements[results.agreements["metric"].isin(ENSEMBLE_METRICS)].sort_values("dt", kind="stable")
+    of = ["scene", "engine", "truth", "metric"]
+    sides = pairs.assign(side=np.sign(pairs["lower"]) + np.sign(pairs["upper"])).groupby(of, sort=False)["side"]
+    always = pairs[(sides.transform("min") > 0.0) | (sides.transform("max") < 0.0)].drop_duplicates(of)
+    for scene, rows in always.groupby("scene", sort=False):
+        differing = []
+        for (engine, other), of_pair in rows.groupby(["engine", "truth"], sort=False):
+            columns = zip(of_pair["metric"], of_pair["value"].abs(), of_pair["unit"], strict=True)
+            means = [f"{metric.replace('_', ' ')} by {with_unit(f'{value:.2g}', unit)}" for metric, value, unit in columns]
+            differing.append(f"{in_sentence(engine)} and {in_sentence(other)} in {listed(means)}")
+        yield f"Means over the starts of {scene}, which are not checked one by one, differ: {'; '.join(differing)}."
 
 
 def _largest(results: Results, errors: "pd.DataFrame") -> str:

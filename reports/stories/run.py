@@ -16,6 +16,7 @@ from dropspin.reports.stories.findings import (
     ProfileComparison,
     beside_recordings,
     counts,
+    ensemble_differences,
     finding_sentences,
     missing_engines,
     profile_comparisons,
@@ -63,7 +64,7 @@ def overview(results: Results) -> Overview:
     """The overview of a run."""
     tally, profiles = counts(results), profile_comparisons(results)
     before = [*_quick(results), *missing_engines(results), *(profile.sentence for profile in profiles)]
-    after = [*beside_recordings(results), *reproduce_drawn(results)]
+    after = [*ensemble_differences(results), *beside_recordings(results), *reproduce_drawn(results)]
     return Overview(
         verdict=verdict_sentence(results, tally),
         points=[*map(Point, before), *conclusion(results), *map(Point, after)],

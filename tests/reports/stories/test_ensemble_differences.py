@@ -1,0 +1,44 @@
+"""What the conclusion says of the means over the starts of an ensemble, which no check judges."""
+
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+
+from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.results.table import empty_table
+from dropspin.reports.stories.findings import ensemble_differences
+
+
+def differing(*rows):
+    """The sentences of a run with differences between two engines: metric, time step [s], ends of the interval."""
+    pairs = [
+        {"scene": "anyhow", "engine": "wang", "truth": "mine", "metric": metric, "dt": dt, "unit": "s" if metric == "rest_time" else "1"}
+        | {"value": 0.5 * (lower + upper), "lower": lower, "upper": upper, "kind": "agreement"}
+        for metric, dt, lower, upper in rows
+    ]
+    agreements = pd.DataFrame(pairs, columns=empty_table().columns)
+    return list(ensemble_differences(replace(EMPTY, agreements=agreements)))
+
+
+EMPTY = Results(table=empty_table(), engines=["wang", "mine"], scenes={}, trajectories={}, ensembles={}, provenance={})
+
+
+def test_means_that_differ_at_every_time_step_are_stated_with_the_values_of_the_finest():
+    found = differing(
+        ("rest_time", 0.002, 0.1, 0.3),
+        ("rest_time", 0.001, 0.05, 0.15),
+        ("energy_at_end", 0.002, -2.0, -1.0),
+        ("energy_at_end", 0.001, -0.4, -0.2),
+    )
+    start = "Means over the starts of anyhow, which are not checked one by one, differ: Wang's method and mine in "
+    assert found == [f"{start}rest time by 0.1 s, energy at end by 0.3."]
+
+
+@pytest.mark.parametrize("coarser", [(-0.1, 0.3), (-0.3, -0.1)])
+def test_means_that_do_not_differ_or_change_their_order_are_not_stated(coarser):
+    assert differing(("rest_time", 0.002, *coarser), ("rest_time", 0.001, 0.05, 0.15)) == []
+
+
+def test_other_differences_are_not_means():
+    assert differing(("position_error", 0.001, 0.05, 0.15)) == []

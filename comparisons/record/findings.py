@@ -222,14 +222,18 @@ def changes(engine: str, releases: Iterable[Release]) -> list[Change]:
 
 def _moved(change: Change, precision: type) -> list[str]:
     """The metrics that differ by more than rounding, the largest difference first."""
-    scene, old, new = problem(change.scene), change.was.values, change.now.values
-    sizes = {}
-    for metric in old.keys() & new.keys() - ARTEFACTS - JUMPING:
-        unit = METRICS[metric].unit
-        # An error that is larger than its scale is rounded in proportion to itself.
-        rounding = tolerance(scene, unit, precision, scene.steps(change.dt), 0.0) * max(1.0, abs(old[metric]) / scale(scene, unit))
-        sizes[metric] = abs(new[metric] - old[metric]) / rounding
+    old, new = change.was.values, change.now.values
+    sizes = {
+        metric: abs(new[metric] - old[metric]) / rounding(change.scene, change.dt, metric, old[metric], precision)
+        for metric in old.keys() & new.keys() - ARTEFACTS - JUMPING
+    }
     return sorted((metric for metric, size in sizes.items() if size > 1.0), key=lambda metric: (-sizes[metric], metric))
+
+
+def rounding(name: str, dt: float, metric: str, value: float, precision: type = np.float64) -> float:
+    """By how much rounding may change a value of a metric; an error that is larger than its scale is rounded in proportion to itself."""
+    scene, unit = problem(name), METRICS[metric].unit
+    return tolerance(scene, unit, precision, scene.steps(dt), 0.0) * max(1.0, abs(value) / scale(scene, unit))
 
 
 def periods(label: str, releases: Sequence[Release], changed: Iterable[Change]) -> list[list[Release]]:

@@ -1,5 +1,6 @@
-"""Measure one cell of a record again, and compare its motions with those of the record, bit for bit."""
+"""Measure one cell of a record again, and compare its motions, bit for bit, and its values with those of the record."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from threading import Event
@@ -7,7 +8,7 @@ from typing import NamedTuple
 
 from dropspin.comparisons.engines.registry import parsed
 from dropspin.comparisons.record.environments import measured
-from dropspin.comparisons.record.findings import Case, Release, read, release_of
+from dropspin.comparisons.record.findings import Case, Release, read, release_of, rounding
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.record.store import BLANK, MACHINE, machine
 from dropspin.comparisons.running.recording import Breakdown
@@ -17,14 +18,26 @@ from dropspin.scenarios.errors import verify_known
 NONE = Case("not measured", "", "", {})
 
 
+class OtherValue(NamedTuple):
+    """A value of a metric that differs although the motion is the same: as recorded, and as measured now (NaN if it no longer is)."""
+
+    dt: float
+    metric: str
+    was: float
+    now: float
+    is_rounding: bool
+
+
 class Again(NamedTuple):
     """A cell that was measured again.
 
     Attributes:
+        scene: The scene.
         cases: By time step [s]: as recorded, and as measured now.
         differing: What the motions depend on and is not as in the record, by name: as recorded, and now.
     """
 
+    scene: str
     cases: Mapping[float, tuple[Case, Case]]
     differing: Mapping[str, tuple[str, str]]
 
@@ -32,6 +45,22 @@ class Again(NamedTuple):
     def moved(self) -> list[float]:
         """The time steps [s] at which the motion or the verdict differs."""
         return [dt for dt, (was, now) in self.cases.items() if (was.verdict, was.trajectory) != (now.verdict, now.trajectory)]
+
+    @property
+    def other_values(self) -> list[OtherValue]:
+        """The recorded values that differ in a bit where verdict and motion do not."""
+        return [
+            OtherValue(dt, metric, value, found, abs(found - value) <= rounding(self.scene, dt, metric, value))
+            for dt, (was, now) in self.cases.items()
+            if dt not in self.moved
+            for metric, value in was.values.items()
+            if repr(found := now.values.get(metric, math.nan)) != repr(value)
+        ]
+
+    @property
+    def recomputed(self) -> list[OtherValue]:
+        """Those of them that differ by more than rounding."""
+        return [value for value in self.other_values if not value.is_rounding]
 
 
 def rerun(folder: str | Path, plan: Plan, label: str, release: str, scene: str, *, time_limit: float) -> Again:
@@ -59,7 +88,7 @@ def rerun(folder: str | Path, plan: Plan, label: str, release: str, scene: str, 
     was, given = _surroundings(recorded), _surroundings(now)
     differing = {name: (was.get(name, "none"), given.get(name, "none")) for name in was | given if was.get(name) != given.get(name)}
     cases = {dt: case for (of, name, dt), case in recorded.cases.items() if (of, name) == (label, scene)}
-    return Again({dt: (case, now.cases.get((label, scene, dt), NONE)) for dt, case in cases.items()}, differing)
+    return Again(scene, {dt: (case, now.cases.get((label, scene, dt), NONE)) for dt, case in cases.items()}, differing)
 
 
 def _recorded(folder: str | Path, engine: str, label: str, release: str, scene: str) -> Release:

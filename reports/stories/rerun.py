@@ -11,15 +11,20 @@ from dropspin.reports.stories.numbers import in_ms, quantity, unit, word
 from dropspin.scenarios.text import counted
 
 
-def document(again: Again, scene: str) -> Document:
-    """A row for each time step: the leading error of the scene in the record and now, and whether the motion is the same."""
-    metric = leading(scene)
+def document(again: Again) -> Document:
+    """The leading error of the scene and whether the motion is the same, by time step; and other values of the same motions."""
+    metric = leading(again.scene)
     error = f"{quantity(metric)} error{unit(METRICS[metric].unit)}"
     rows = [
         {"dt": in_ms(dt), f"{error}, recorded": _value(was, metric), "now": _value(now, metric), "motion": _motion(was, now)}
         for dt, (was, now) in again.cases.items()
     ]
-    return Document(f"{scene}, measured again", [Table(rows), Sentences(_sentences(again))])
+    others = [
+        {"dt": in_ms(one.dt), "metric": one.metric + unit(METRICS[one.metric].unit), "recorded": repr(one.was), "now": repr(one.now)}
+        for one in again.recomputed
+    ]
+    tables = [Table(rows), Table(others)] if others else [Table(rows)]
+    return Document(f"{again.scene}, measured again", [*tables, Sentences(_sentences(again))])
 
 
 def _value(case: Case, metric: str) -> str:
@@ -41,17 +46,39 @@ def _sentences(again: Again) -> list[str]:
             reasons.append(f"In the record, {word(was.verdict)}: {was.reason}.")
         if now.verdict != "measured":
             reasons.append(f"{word(now.verdict).capitalize()}: {now.reason or 'the plan of the record no longer has this time step'}.")
-    moved, count = len(again.moved), len(again.cases)
-    differ = f"{moved} of {counted(count, 'result')} {'differs' if moved == 1 else 'differ'} from the record."
-    result = differ if moved else "Every result equals that of the record, bit for bit."
     others = "; ".join(f"{name} {now} (in the record: {was})" for name, (was, now) in again.differing.items())
     surroundings = f"Different from the record: {others}." if others else "Adapter, versions and machine are those of the record."
-    return [*dict.fromkeys(reasons), result, surroundings]
+    return [*dict.fromkeys(reasons), *_differences(again), surroundings]
+
+
+def _differences(again: Again) -> list[str]:
+    """Sentences: whether verdicts and motions are those of the record, and how many values of equal motions are not."""
+    moved, others, recomputed = again.moved, again.other_values, again.recomputed
+    if not (moved or others):
+        return ["Every verdict, motion and value equals that of the record, bit for bit."]
+    differ = f"At {len(moved)} of {counted(len(again.cases), 'time step')}, the motion or the verdict differs from the record."
+    sentences = [differ if moved else "Every verdict and motion equals that of the record, bit for bit."]
+    of_all = counted(sum(len(was.values) for dt, (was, _) in again.cases.items() if dt not in moved), "value")
+    if recomputed:
+        differ = f"{len(recomputed)} of {of_all} of equal motions {'differs' if len(recomputed) == 1 else 'differ'} by more than rounding"
+        sentences.append(f"{differ}: dropspin computes these metrics otherwise than when the record was measured.")
+    if rounded := len(others) - len(recomputed):
+        sentences.append(f"{rounded} of {of_all} of equal motions {'differs' if rounded == 1 else 'differ'} by rounding alone.")
+    return sentences
 
 
 def as_data(again: Again) -> dict[str, Any]:
     """The results with all digits, for JSON."""
-    cases = [{"dt": dt, "same": dt not in again.moved, "recorded": _case(was), "now": _case(now)} for dt, (was, now) in again.cases.items()]
+    cases = [
+        {
+            "dt": dt,
+            "same": dt not in again.moved,
+            "recomputed": [value.metric for value in again.recomputed if value.dt == dt],
+            "recorded": _case(was),
+            "now": _case(now),
+        }
+        for dt, (was, now) in again.cases.items()
+    ]
     return {"cases": cases, "differing": {name: {"recorded": was, "now": now} for name, (was, now) in again.differing.items()}}
 
 

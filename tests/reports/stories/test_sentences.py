@@ -46,7 +46,7 @@ def moved(new):
 
 
 def again(*cases, **differing):
-    return " ".join(rerun._sentences(Again(dict(enumerate(cases)), differing)))
+    return " ".join(rerun._sentences(Again("drop-ball", dict(enumerate(cases)), differing)))
 
 
 def published(*statuses):
@@ -98,11 +98,12 @@ def modelled(**tables):
         (moved(0.1 + 1e-7), "drop-ball with a: energy error 0.100 changed by 1.00e-07 at dt\xa0=\xa01\xa0ms"),
         (
             again((MEASURED, LATER), (MEASURED, MEASURED), numpy=("1", "2")),
-            "1 of 2 results differs from the record. Different from the record: numpy 2 (in the record: 1).",
+            "At 1 of 2 time steps, the motion or the verdict differs from the record. "
+            "Different from the record: numpy 2 (in the record: 1).",
         ),
         (
             again((DECLINES, DECLINES)),
-            "Declined: no floor. Every result equals that of the record, bit for bit. "
+            "Declined: no floor. Every verdict, motion and value equals that of the record, bit for bit. "
             "Adapter, versions and machine are those of the record.",
         ),
         (published("for comparison"), "0 of 0 values are reproduced; 0 differ."),

@@ -81,6 +81,25 @@ def test_exact_solutions_reproduce_formulas_and_rates(name):
     assert len(statuses) > 3
 
 
+def test_the_bouncing_ball_rests_where_the_method_of_the_source_does_as_dt_vanishes():
+    """Explicit Euler as in the FMU's model.c, which compares the speed of the rebound with 0.1 m/s: the error is the method's."""
+    [source] = sources(["fmi-bouncing-ball"])
+    [rest] = [one for one in FORMULAS[source.formula](source) if one.quantity == "at rest from [s]"]
+
+    def steps_to_rest(dt):
+        height, speed, steps = 1.0, 0.0, 0
+        while True:
+            height, speed, steps = height + dt * speed, speed - 9.81 * dt, steps + 1
+            if height <= 0.0:
+                height, speed = 0.0, -0.7 * speed
+                if speed < 0.1:
+                    return steps
+
+    assert math.ceil(steps_to_rest(1e-3) / 10) == round(100 * float(rest.published))  # rows are 10 ms apart
+    errors = [dt * steps_to_rest(dt) - float(rest.here) for dt in (1e-3, 1e-4, 1e-5)]
+    assert [round(error, 4) for error in errors] == [0.1049, 0.0069, 0.0006]
+
+
 def test_errors_of_the_five_tools_of_the_brick():
     """Those measured by integration with a tolerance of 1e-13, at all 301 times instead of the whole seconds."""
     errors = {one.tool: abs(one.difference) for one in nesc_brick(*sources(["nesc-brick"])) if one.status == "error of the source"}

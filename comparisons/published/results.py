@@ -107,8 +107,8 @@ def with_value(result: Result, value: float | Breakdown, why_not: str, significa
         significant: As in `agreement`.
     """
     if isinstance(value, Breakdown):
-        if why_not or value.verdict == "declined":
-            return replace(result, status="not reproducible", reason=why_not or value.reason)
+        if not result.by or value.verdict == "declined":
+            return replace(result, status="not reproducible", reason=value.reason)
         return replace(result, reason=value.reason, verdict=value.verdict)
     if result.published == ABSENT:
         return replace(result, here=f"{value:.{SHOWN}g}", status="for comparison")

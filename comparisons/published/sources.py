@@ -52,7 +52,7 @@ class Group(Table):
         tool: The tool that the source describes.
         by: The engine that runs the scene here; empty if there is none.
         why: Why this engine gives these values.
-        why_not: Why none can give them here; empty for values that are claimed to be reproducible.
+        why_not: Why none can give them here, or why the values of `by` differ; empty for values that are claimed to be reproducible.
         since: The oldest version of the engine that gives these values; empty for any.
         scene: The name of the scene.
         quantities: Names of quantities, as in `quantities.py`.

@@ -19,7 +19,7 @@ def reproduce_command(names: tuple[str, ...], output: str, json_output: bool, **
     values that cannot be reproduced, the reason is printed. The default is all sources but acosta-cube, which needs DIR, a folder of
     measured tosses.
 
-    Exit code 1: a value that should be reproduced differs.
+    Exit code 1: a value that should be reproduced differs. 3: an engine broke down, or an engine of a SOURCE that was named is missing.
     """
     from dropspin.comparisons.published.sources import source_names, sources
     from dropspin.comparisons.published.study import reproduce
@@ -35,4 +35,4 @@ def reproduce_command(names: tuple[str, ...], output: str, json_output: bool, **
         with share_bar("reproduce") as on_progress:
             results = reproduce(names, data=data, **options, on_progress=on_progress)
         keep(Reproduction(sources=chosen, results=results))
-    return exit_code(results)
+    return exit_code(results, named=bool(names))

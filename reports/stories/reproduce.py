@@ -89,8 +89,9 @@ def _verdict(results: Sequence[Result]) -> str:
     return f"{reproduced}; {counted(counts['differs'], 'differs', 'differ')}{not_run}."
 
 
-def exit_code(results: Sequence[Result]) -> int:
-    """1 if a value differs that is claimed to be reproducible, 3 if an engine broke down, otherwise 0."""
+def exit_code(results: Sequence[Result], *, named: bool) -> int:
+    """1 if a value differs that is claimed to be reproducible, 3 if an engine broke down or a named source lacks it, otherwise 0."""
     if any(row.status == "differs" for row in results):
         return 1
-    return 3 if any(row.verdict in BREAKDOWNS for row in results) else 0
+    without_value = BREAKDOWNS | {"missing"} if named else BREAKDOWNS
+    return 3 if any(row.verdict in without_value for row in results) else 0

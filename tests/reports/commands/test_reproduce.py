@@ -48,17 +48,18 @@ def test_json_has_every_value(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("status", "verdict", "code", "words"),
+    ("names", "status", "verdict", "code", "words"),
     [
-        ("differs", "", 1, "0 of 1 value is reproduced; 1 differs."),
-        ("not run", "crashed", 3, "0 of 0 values are reproduced; 0 differ; 1 was not run."),
-        ("not run", "missing", 0, "0 of 0 values are reproduced; 0 differ; 1 was not run."),
+        ((), "differs", "", 1, "0 of 1 value is reproduced; 1 differs."),
+        ((), "not run", "crashed", 3, "0 of 0 values are reproduced; 0 differ; 1 was not run."),
+        ((), "not run", "missing", 0, "0 of 0 values are reproduced; 0 differ; 1 was not run."),
+        (("nesc-brick",), "not run", "missing", 3, "0 of 0 values are reproduced; 0 differ; 1 was not run."),
     ],
 )
-def test_exit_codes(status, verdict, code, words, tmp_path, monkeypatch):
+def test_exit_codes(names, status, verdict, code, words, tmp_path, monkeypatch):
     result = Result("nesc-brick", "tool", "quantity", "1.0", "1.1", "engine", status, "a reason.", 0.1, verdict)
     monkeypatch.setattr(study, "reproduce", lambda names, **options: [result])
-    done = dropspin("reproduce", "nesc-brick", cwd=tmp_path)
+    done = dropspin("reproduce", *names, cwd=tmp_path)
     assert done.returncode == code
     assert words in done.stdout
     assert f"tool, engine: {status}: a reason." in done.stdout

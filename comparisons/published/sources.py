@@ -6,11 +6,11 @@ The files have numbers and names only; every description is dropspin's own.
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
-from dropspin.comparisons.published.results import ABSENT, BOUND, TOLERANCE
+from dropspin.comparisons.published.results import ABSENT, TOLERANCE
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.loading import from_mapping, read_toml
@@ -18,14 +18,13 @@ from dropspin.scenarios.tables import Table
 from dropspin.scenarios.validation import validated
 
 DATA = Path(__file__).parent / "data"
-NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
+DIGITS = r"\d+(\.\d+)?(e[-+]?\d+)?"
+PRINTED = re.compile(rf"([<>≤] )?-?{DIGITS}|-?{DIGITS}{TOLERANCE}{DIGITS}|{ABSENT}")
 
 
 def verified_printed(printed: str) -> str:
     """Digits of a number, a bound, a number with a tolerance, or none; `ValueError` for others."""
-    bound = BOUND.fullmatch(printed)
-    numbers = [bound[2]] if bound else printed.split(TOLERANCE)
-    if printed != ABSENT and not (len(numbers) <= 2 and all(map(NUMBER.fullmatch, numbers))):
+    if not PRINTED.fullmatch(printed):
         raise ValueError("must be a number such as 3.75 or 5e-3, a bound such as < 1.01, a tolerance such as 0.25±0.0025, or –")
     return printed
 
@@ -67,6 +66,14 @@ class Group(Table):
     scene: str
     quantities: tuple[str, ...]
     cases: tuple[Case, ...]
+
+    @model_validator(mode="after")
+    def _each_quantity_has_digits(self) -> Self:
+        for number, case in enumerate(self.cases):
+            if len(case.printed) != len(self.quantities):
+                wanted = f"one for each of quantities, {list(self.quantities)}"
+                raise ValueError(f"cases[{number}].printed: got {list(case.printed)}; must be {wanted}")
+        return self
 
 
 class Source(Table):

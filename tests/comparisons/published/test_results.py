@@ -5,7 +5,7 @@ import math
 import pytest
 
 from dropspin.comparisons.published.results import agreement
-from dropspin.comparisons.published.sources import Case
+from dropspin.comparisons.published.sources import Case, Source, sources
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.validation import validated
 
@@ -61,7 +61,20 @@ def test_bounds_and_tolerances_of_the_source(printed, inside, outside):
     assert not agreement(printed, math.nan).agrees
 
 
-@pytest.mark.parametrize("printed", ["3,7475", "3.7475 m", "nan", "inf", "", "3.75±5%", "< x", "1±2±3", "0.25±inf"])
+@pytest.mark.parametrize(
+    "printed", ["3,7475", "3.7475 m", "nan", "inf", "", "3.75±5%", "< x", "1±2±3", "0.25±inf", "0.25±-0.0025", "< 1±2"]
+)
 def test_digits_that_are_no_number_are_refused(printed):
     with pytest.raises(DropspinError, match=r"must be a number such as 3\.75 or 5e-3, a bound such as < 1\.01, a tolerance"):
         validated(Case, "mine.toml", {"case": "a", "dt": 1e-3, "printed": [printed]})
+
+
+@pytest.mark.parametrize("printed", [["1.0"], ["1.0", "2.0", "3.0"]])
+def test_a_case_has_digits_for_each_quantity(printed):
+    content = sources(["fmi-bouncing-ball"])[0].model_dump(mode="json")
+    content["groups"][0] |= {"quantities": ["height at 0.1 s", "height at 0.2 s"]}
+    content["groups"][0]["cases"][0]["printed"] = printed
+    with pytest.raises(DropspinError) as error:
+        validated(Source, "mine.toml", content)
+    shown = f"{printed}; must be one for each of quantities, ['height at 0.1 s', 'height at 0.2 s']."
+    assert str(error.value) == f"mine.toml: groups[0]: cases[0].printed: got {shown}"

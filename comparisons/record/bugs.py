@@ -1,8 +1,9 @@
-"""Known bugs of engines: public reports in `bugs.toml`, each simulated in the releases that it is about, and judged by a closed form.
+"""Known bugs of engines: public reports in `bugs.toml`, each simulated in the releases that it is about, and judged by a range.
 
 The command of a case is run as a user would run it, each release in an environment of its own, which `prepare` makes and keeps.
 """
 
+import math
 import re
 import shlex
 import shutil
@@ -49,9 +50,10 @@ class Bug(Table):
         scene: A scene of the catalogue, or a TOML file beside this one.
         dt: The time step [s].
         metric: The metric that shows it.
-        closed_form: The formula from which the range `fault` follows.
+        closed_form: The formula or the bound from which the range `fault` follows.
         fault: The least and the largest value of the metric with the fault.
         sound: The largest size of the metric without it.
+        right_in: A scene of the catalogue that the fault leaves right: there the metric is not above `sound`; empty if none is needed.
         releases: Releases to run, oldest first: the first that has the fault, and the first without it, if there is one.
         silent: Why no check of the catalogue's scenes detects the fault; empty if one does.
         why_not: Why no scene can show it; empty if one can.
@@ -69,6 +71,7 @@ class Bug(Table):
     closed_form: str = ""
     fault: tuple[float, float] = (0.0, 0.0)
     sound: float = 0.0
+    right_in: str = ""
     releases: tuple[str, ...] = ()
     silent: str = ""
     why_not: str = ""
@@ -87,7 +90,7 @@ class Bug(Table):
     def arguments(self) -> list[str]:
         """The command that shows it, without `dropspin`."""
         scene = self.scene if self.is_of_catalogue else str(FILE.with_name("bugs") / self.scene)
-        return ["run", scene, "-e", self.label, "--dt", f"{self.dt:g}", "--quick"]
+        return ["run", scene, *filter(None, [self.right_in]), "-e", self.label, "--dt", f"{self.dt:g}", "--quick"]
 
     @property
     def command(self) -> str:
@@ -103,12 +106,14 @@ class Outcome(BaseModel):
         release: The release.
         state: Whether the value is that of the fault.
         value: The value of the metric; NaN if there is none.
+        right: Its value in the scene that the fault leaves right; NaN if the report has none.
         said: What the command printed about the scene; or why it was not run.
     """
 
     release: str
     state: State
     value: float = Field(default=float("nan"))
+    right: float = Field(default=float("nan"))
     said: str = ""
 
 
@@ -136,9 +141,11 @@ def load_bugs(names: Iterable[str] = ()) -> list[Bug]:
     return [Bug.model_validate({"name": name, **listed[name]}) for name in chosen]
 
 
-def state_of(bug: Bug, value: float) -> State:
-    """Whether a value of the metric is that of the fault."""
+def state_of(bug: Bug, value: float, right: float = math.nan) -> State:
+    """Whether a value of the metric is that of the fault, and the value in the scene that the fault leaves right is right."""
     least, most = bug.fault
+    if bug.right_in and not abs(right) <= bug.sound:
+        return "another value"
     if least <= value <= most:
         return "shown"
     return "not shown" if abs(value) <= bug.sound else "another value"
@@ -234,6 +241,7 @@ def _outcome(bug: Bug, release: str, folder: Path, stopping: Event) -> Outcome:
     if rows.empty or rows["value"].isna().all():
         broken = table[table["reason"] != ""]["reason"]
         return Outcome(release=release, state="not run", said=str(broken.iloc[0]) if len(broken) else "it has no value")
-    value = float(rows["value"].iloc[0])
+    control = rows["scene"] == bug.right_in
+    [value, right] = [float(of["value"].iloc[0]) if len(of) else math.nan for of in (rows[~control], rows[control])]
     said = re.search(r"^✗ (\S+ · .+)$", printed, re.MULTILINE)
-    return Outcome(release=release, state=state_of(bug, value), value=value, said=said[1] if said else "")
+    return Outcome(release=release, state=state_of(bug, value, right), value=value, right=right, said=said[1] if said else "")

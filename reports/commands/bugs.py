@@ -26,7 +26,7 @@ def bugs_command(names: tuple[str, ...], is_to_prepare: bool, environments: str,
     """Show publicly reported bugs of engines, each in the releases that have it and in those that do not.
 
     CASE is a reported bug; the default is all. Its scene is run with each release in an environment of its own, and the result is compared
-    with the value that the fault predicts in closed form.
+    with the range that follows from the fault.
 
     Exit code: 1 if the releases do not show a fault as reported, 3 if a release could not be run.
     """

@@ -67,8 +67,11 @@ def _of_bug(bug: Bug, result: Verdict, outcomes: Sequence[Outcome], *, on_termin
 
 def _row(bug: Bug, outcome: Outcome) -> dict[str, str]:
     metric = f"{subject(bug.metric, 'truth', '')}{unit(METRICS[bug.metric].unit)} at {in_ms(bug.dt)}"
-    value = "–" if math.isnan(outcome.value) else formatted(outcome.value)
-    return {"release": f"{bug.engine} {outcome.release}", metric: value, "fault": outcome.state}
+    value, right = ("–" if math.isnan(one) else formatted(one) for one in (outcome.value, outcome.right))
+    least, most = bug.fault
+    row = {"release": f"{bug.engine} {outcome.release}", metric: value, "with the fault": f"{least:g} to {most:g}"}
+    row |= {"without it": f"± {bug.sound:g}"} | ({f"in {bug.right_in}": right} if bug.right_in else {})
+    return row | {"fault": outcome.state}
 
 
 def _said(bug: Bug, outcomes: Sequence[Outcome]) -> list[str]:

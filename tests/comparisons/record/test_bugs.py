@@ -36,6 +36,15 @@ def test_a_value_shows_the_fault_only_within_its_closed_form(value, state):
 
 
 @pytest.mark.parametrize(
+    ("value", "right", "state"),
+    [(0.184, 1.5e-3, "shown"), (0.170, 0.170, "another value"), (0.184, float("nan"), "another value"), (1.5e-3, 1.5e-3, "not shown")],
+)
+def test_friction_that_is_too_weak_in_every_direction_does_not_depend_on_the_direction(value, right, state):
+    """With 0.9 times the friction both boxes slide 1.53 m (1/0.9 - 1) = 0.17 m too far, and one value alone is within the range."""
+    assert state_of(*load_bugs(["pybullet-friction-by-direction"]), value, right) == state
+
+
+@pytest.mark.parametrize(
     ("states", "expected"),
     [
         (["shown"], Verdict("shown")),
@@ -72,8 +81,12 @@ def test_the_list_has_links_scenes_metrics_and_releases_that_exist():
             assert bug.metric in METRICS
             assert bug.engine in plan.engines
             assert all(numbers_of(one) < numbers_of(other) for one, other in pairwise(bug.releases)), bug.name
-            assert state_of(bug, sum(bug.fault) / 2) == "shown", bug.name
-            assert state_of(bug, 0.0) == "not shown", bug.name
+            assert state_of(bug, sum(bug.fault) / 2, right=0.0) == "shown", bug.name
+            assert state_of(bug, 0.0, right=0.0) == "not shown", bug.name
+            least, most = bug.fault
+            shown = page.partition(f"## {bug.name}: ")[2].partition("\n## ")[0]
+            assert f" | {least:g} to {most:g} | ± {bug.sound:g} | " in shown, bug.name
+            assert f"`{bug.command}`" in shown, bug.name
             assert bug.is_of_catalogue or bug.silent, bug.name
     used = {bug.scene for bug in bugs if bug.label and not bug.is_of_catalogue}
     assert {path.name for path in FILE.with_name("bugs").iterdir()} == used
@@ -111,3 +124,14 @@ def test_a_bug_is_shown_by_the_installed_release(tmp_path):
     assert second["verdict"].startswith("not expressible: ")
     page = (tmp_path / "out/bugs/bugs.md").read_text(encoding="utf-8")
     assert "issues/1890" in page
+
+
+@pytest.mark.extended
+def test_a_case_has_the_value_of_the_scene_that_the_fault_leaves_right(tmp_path):
+    done = dropspin("bugs", "pybullet-friction-by-direction", "--json", cwd=tmp_path)
+    [row] = json.loads(done.stdout)
+    assert row["state"] == "shown"
+    assert row["value"] == pytest.approx(0.184, abs=5e-4)
+    assert row["right"] == pytest.approx(1.5e-3, rel=0.01)
+    page = (tmp_path / "out/bugs/bugs.md").read_text(encoding="utf-8")
+    assert "| 0.184 | 0.1 to 0.3 | ± 0.01 | 1.50e-03 | shown |" in page

@@ -13,8 +13,8 @@ from dropspin.scenarios.loading import read_toml
 from dropspin.scenarios.tables import Table
 
 FILE = Path(__file__).with_name("plan.toml")
-NUMPY_1 = ["numpy<2", "pandas<3"]
-"""pandas 3 needs NumPy 2."""
+NUMPY_1 = ["numpy<2", "pandas<3", "pyarrow<26"]
+"""pandas 3 and pyarrow 26 need NumPy 2."""
 
 
 class Releases(Table):

@@ -239,7 +239,7 @@ def ensemble_differences(results: Results) -> Iterator[str]:
         for (engine, other), of_pair in rows.groupby(["engine", "truth"], sort=False):
             columns = zip(of_pair["metric"], of_pair["value"].abs(), of_pair["unit"], strict=True)
             means = [f"{metric.replace('_', ' ')} by {with_unit(f'{value:.2g}', unit)}" for metric, value, unit in columns]
-            differing.append(f"{in_sentence(engine)} and {in_sentence(other)} in {listed(means)}")
+            differing.append(f"{in_sentence(str(engine))} and {in_sentence(str(other))} in {listed(means)}")
         yield f"Means over the starts of {scene}, which are not checked one by one, differ: {'; '.join(differing)}."
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from dropspin.comparisons.judging.verdicts import VERDICTS
+from dropspin.comparisons.judging.verdicts import FAILURES, VERDICTS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.conclusion import WITHIN
@@ -50,10 +50,11 @@ class Leading(NamedTuple):
         unit: Unit of the sizes: rad; % for ratios, and for positions, of which `of` has the length that is 100 %.
         of: Such as `of 0.1 m`; empty for angles and ratios.
         dt: Time step [s].
-        sizes: The size of the error in this unit, as text by engine; of engines with a value.
+        sizes: The size of the error in this unit, as text by engine; of engines with a value; no small one of an engine that fails in
+            others alone.
         bounds: The bounds of errors that pass though they are above 1 %, in this unit, as text by engine.
         levels: The decade of the error relative to its scale, by engine, from 0 (up to 1e-8) over 1 (up to 1e-7) to 8 (above 0.1); None if
-            undefined.
+            undefined, or not among the sizes.
     """
 
     metric: str
@@ -76,9 +77,12 @@ def leading_errors(results: Results) -> dict[str, Leading]:
     for name, of_scene in results.by_scene.items():
         finest = of_scene.leading_errors(name)
         if not finest.empty:
-            metric, dt, values = str(finest["metric"].iloc[0]), float(finest["dt"].iloc[0]), finest["value"].abs()
-            unit = METRICS[metric].unit
+            metric, dt = str(finest["metric"].iloc[0]), float(finest["dt"].iloc[0])
+            failing = of_scene.table[of_scene.table["verdict"].isin(FAILURES)].groupby("engine")["metric"].agg(set)
+            elsewhere = [engine for engine, metrics in failing.items() if metric not in metrics]
+            unit, values = METRICS[metric].unit, finest["value"].abs()
             whole = scale(results.scenes[name], unit)
+            values = values.mask(finest.index.isin(elsewhere) & (values <= WITHIN * whole))  # a small error beside a failure misleads
             parts = {engine: float(values.get(engine, math.nan)) / whole for engine in results.engines}
             percent, of = 1.0 if unit == "rad" else 100.0, "" if unit in ("1", "rad") else f"of {whole:.2g} {unit}"
             sizes = {engine: short(percent * part) for engine, part in parts.items() if not math.isnan(part)}

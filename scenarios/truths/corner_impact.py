@@ -81,8 +81,7 @@ def corner_impact(scene: Scenario, floor: Floor, law: Law | None = None) -> Trut
     where = {1: "corner", 2: "edge"}.get(points, "face")
     if scene.body.semi_axes.any():
         where = "ball" if scene.body.is_ball else "point"
-    count = "one" if len(events) == 1 else str(len(events))
-    impacts = f"{count} {where} impact{'s' if len(events) > 1 else ''}"
+    impacts = f"one {where} impact" if len(events) == 1 else f"{where} impacts"  # their number: what `until_near` leaves
     then = "; then sliding and rolling (Coriolis 1835)" if last.is_rolling else ""
     statement = f"flights on a parabola, with the rotation of a body without torque, and {impacts} ({impulse}){then}"
     return Truth(f"{where}-impact", statement, states, events, last.end, last.reason)

@@ -1,6 +1,7 @@
 """One status for each engine in each scene, and known faults in every count."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -53,6 +54,17 @@ def test_large_error_that_passes_has_its_bound_beside_it(core):
     assert leading["slip-stick"].bounds == {}  # a known fault, and errors below 1 %
 
 
+def test_small_error_is_not_shown_of_an_engine_that_fails_in_another_metric(core):
+    """The row shows the orientation, which is the known fault of Wang's method; MuJoCo's, which is right, is no cell of a failure."""
+    table, scene = core.table.copy(), "spin-principal-500"
+    fails = (table["scene"] == scene) & (table["engine"] == "mujoco") & (table["metric"] == "energy_error") & (table["dt"] == 1e-3)
+    table.loc[fails, ["verdict", "value"]] = "failed", 0.05
+    before, after = (leading_errors(results)[scene] for results in (core, replace(core, table=table)))
+    assert (before.metric, after.metric, before.sizes["pybullet"]) == ("orientation_error", "orientation_error", after.sizes["pybullet"])
+    assert ("mujoco" in before.sizes, "mujoco" in after.sizes, after.levels["mujoco"]) == (True, False, None)
+    assert after.sizes["wang"] == before.sizes["wang"]
+
+
 @pytest.mark.extended
 def test_scenes_have_the_property_with_which_the_conclusion_excepts_them(core):
     with_friction = [name for name, scene in core.scenes.items() if any(0.0 < one.coefficient < np.inf for one in scene.surfaces)]
@@ -71,7 +83,8 @@ def test_every_status_has_a_meaning():
 @pytest.mark.parametrize(
     ("scene", "engine", "pattern"),
     [
-        ("rock-block", "pybullet", r"Angular momentum 3\.\d+ % at 1 ms, bound ≤ 10 %; every check of the scene is within its bound"),
+        ("rock-block", "pybullet", r"Angular momentum 3\.\d+ % at 1 ms, .*; passed \(trend undecided\): .*; .*: only 2 of 3 time steps .*"),
+        ("fall-damped", "pybullet", r"Position 0\.0171 m at 1 ms, bound ≤ 0\.03 m; every check of the scene is within its bound.*"),
         ("drop-ball-slipping", "pybullet", r"Bounce height 0\.\d+ % at 1 ms, no bound at this time step; every check .*; as dt → 0: .*"),
         (
             "drop-box-turning",

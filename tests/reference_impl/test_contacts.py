@@ -177,6 +177,18 @@ def test_fast_small_body_stays_below_the_floor():
     assert np.ptp(heights[-60:]) < 1e-2
 
 
+@pytest.mark.parametrize("half", [0.01, 0.5, 20.0])
+def test_corner_of_a_body_of_any_size_strikes_when_it_reaches_the_floor(half):
+    """A cube that falls slowly on a corner, in its own lengths: it is stopped in the step after the corner is below the floor."""
+    body = cube(half)
+    orientation = Rotation.align_vectors([0.0, -1.0, 0.0], [1.0, 1.0, 1.0])[0].as_quat()
+    height, dt = np.sqrt(3.0) * half, 1e-3
+    state = np.array([0, 1.01 * height, 0, *orientation, 0, -half, 0, 0, 0, 0], dtype=float)
+    rows = reference_impl.simulate(state, body, World(floor=Floor(0.0, STICKS)), dt, 40)
+    struck = np.flatnonzero(rows[:, 8] > -half)[0]
+    assert rows[struck - 1, 1] < height <= rows[struck - 2, 1] + 1e-12 * height
+
+
 def test_points_of_a_rim_divide_it_into_three_from_the_lowest():
     """Of a cylinder at random orientations: on the rim, 120° apart, the first as low as the disc is; of a level disc too."""
     packed = pack(Body(1.0, np.eye(3), np.array([[0.0, -0.3, 0.0], [0.0, 0.3, 0.0]]), (0.2, 0.0, 0.2)), World(), 1.0)

@@ -10,6 +10,7 @@ from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.judging.convergence import Claim, Convergence, SeriesPoint
 from dropspin.comparisons.judging.error_budget import ErrorBudget
 from dropspin.comparisons.judging.judge import compared_with_expectations, judge, judge_asymptotic_error, verify_expectations
+from dropspin.comparisons.judging.verdicts import with_reason
 from dropspin.comparisons.measuring.metric import Average
 from dropspin.comparisons.measuring.metrics import METRICS
 
@@ -132,6 +133,30 @@ def test_value_within_bounds_that_exclude_0_is_known_if_the_asymptotic_error_is(
     claim, limit = Claim("faulty", None, np.float64), Convergence(ErrorBudget("model", "extrapolated", 0.25 * sign, *interval), 1e-3)
     assert judge(scene, None, claim, METRICS["energy_error"], point, limit).verdict == expected
     assert judge(scene, None, claim, METRICS["energy_error"], point).verdict == "passed"
+
+
+@pytest.mark.parametrize(("value", "expected"), [(0.05, "passed"), (0.095, "measured"), (0.105, "measured"), (0.15, "failed")])
+@pytest.mark.parametrize("bound", [{"within": [-0.1, 0.1]}, {"within": [-9.0, 0.1]}, {"below": 0.1}])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_sampling_noise_that_may_decide_between_verdicts_leaves_none(value, expected, bound, sign):
+    """On both sides of a bound."""
+    if sign < 0.0:
+        bound = {"within": sorted(-limit for limit in bound["within"])} if "within" in bound else bound
+    point = SeriesPoint(1e-3, 1000, Average(*np.full((3, 1), sign * value)), None, 0.0, noise=0.01)
+    scene = scene_that_expects({"metric": "energy_error"} | bound)
+    found = judge(scene, None, Claim("mine", None, np.float64), METRICS["energy_error"], point)
+    assert (found.verdict, found.basis) == (expected, "few_starts" if expected == "measured" else "")
+
+
+@pytest.mark.parametrize(("cause", "said"), [("setting", True), ("model", False)])
+def test_failure_by_a_setting_is_called_a_setting_error(cause, said):
+    limit = Convergence(ErrorBudget(cause, "extrapolated", 0.2, 0.1, 0.3), 1e-3)
+    found = judge_asymptotic_error(scene_that_expects(), Claim("mine", None, np.float64), METRICS["energy_error"], limit)
+    assert (found.verdict, found.reason.endswith("it is a setting error")) == ("failed", said)
+
+
+def test_outcome_has_its_reason_in_brackets():
+    assert (with_reason("failed", "diverged"), with_reason("failed", "")) == ("failed (diverged)", "failed")
 
 
 def test_equally_narrow_expectations_both_bind():

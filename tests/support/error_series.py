@@ -160,6 +160,13 @@ def random_powers(rng: np.random.Generator, h: Array) -> Array:
     return found
 
 
+def bounded(rng: np.random.Generator, h: Array) -> Array:
+    """An error that has nearly its largest possible size at coarse steps, as a loss of energy may."""
+    size = coefficient(rng, 0.3, 6.0)
+    share = abs(size) * h / np.min(h)
+    return math.copysign(1.0, size) * (np.tanh(share) if rng.random() < 0.5 else -np.expm1(-share))
+
+
 OTHERS: dict[str, Draw] = {
     "vectors by their components": vector(lambda rng, h: powers(float(rng.choice([1.0, 2.0])))(rng, h)),
     "vectors with kinks by their components": vector(kinked),
@@ -170,6 +177,7 @@ OTHERS: dict[str, Draw] = {
     "exponentials": plain(exponential),
     "h / (1 + c h)": plain(fraction),
     "tanh": plain(lambda rng, h: np.tanh(coefficient(rng, 0.1, 7.0) * h)),
+    "bounded errors at their bound": plain(bounded),
     "sines of up to 6 rad": plain(sine),
     "kinks": plain(kinked),
     "order 1 with jitter of a half": plain(jitter),

@@ -13,7 +13,8 @@ import mujoco
 import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import Changes
-from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, PLANE, MuJoCoFile, plain, set_options
+from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of, overrides, plain
+from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, PLANE, MuJoCoFile, set_options
 from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, mesh_of, quaternion, shape_of
 from dropspin.comparisons.diagnosis.parts import VOLUMES
 from dropspin.comparisons.running.recording import Breakdown
@@ -60,7 +61,7 @@ class MuJoCoAlone:
         self.missed = file.missed(self.geoms)
         self.pairs: dict[int, dict[str, Any]] = {}
         if self.surface is not None and file.has_contacts:
-            contacts = {geom: file.contact(geom, self.surface) for geom in self.geoms}
+            contacts = {geom: contact_of(old, geom, self.surface) for geom in self.geoms}
             self.pairs = {geom: contact for geom, contact in contacts.items() if contact is not None}
         joint = old.body_jntadr[self.head]
         is_free = joint >= 0 and old.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
@@ -171,7 +172,7 @@ class MuJoCoAlone:
         """The settings of a contact, with the time constant that MuJoCo raises to two of the file's steps."""
         changed = {name: np.array(str(self._changes[name]).split(), float) for name in ("solref", "solimp") if name in self._changes}
         still = {"margin": 0.0, "gap": 0.0} if "margin" in self._changes else {}
-        return dict(pair) | {"solref": self.clamped(pair)} | ({} if self.file.overrides else changed | still)
+        return dict(pair) | {"solref": self.clamped(pair)} | ({} if overrides(self.file.model) else changed | still)
 
     def clamped(self, pair: Mapping[str, Any]) -> Array:
         """The time constant and the damping ratio that are in force at the file's time step."""

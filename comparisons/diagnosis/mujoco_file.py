@@ -1,4 +1,4 @@
-"""A model file as MuJoCo compiles it: its bodies, what they may land on, and the contacts of two geometries."""
+"""A model file as MuJoCo compiles it: its bodies, and what they may land on."""
 
 import math
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mujoco_compiled import placed
+from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of
 from dropspin.comparisons.diagnosis.source import option_setting, read_source
 from dropspin.comparisons.engines.mujoco_simulation import quiet
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.text import printable
-from dropspin.scenarios.truths.soft_rest import GeomSettings, mixed
 
 BODY, GEOM = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_GEOM
 PLANE, BOX = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX
@@ -229,7 +229,7 @@ class MuJoCoFile:
         return [geom for geom in still.tolist() if geom not in left_out]
 
     def _collide(self, own: Sequence[int], other: int) -> bool:
-        return any(self.contact(one, other) for one in own)
+        return any(contact_of(self.model, one, other) for one in own)
 
     def surface(self, wanted: str | None, own: Sequence[int]) -> int | None:
         """The geometry that some geometries land on: the one named, or the first one.
@@ -244,45 +244,6 @@ class MuJoCoFile:
         if int(self.model.geom_type[others[wanted]]) not in map(int, SURFACES):
             raise DropspinError(f"--on {wanted}: is neither a plane nor a box; name one of these.")
         return others[wanted]
-
-    def contact(self, first: int, second: int) -> dict[str, Any] | None:
-        """The settings of a contact of two geometries, as MuJoCo mixes them; None if they do not collide."""
-        model = self.model
-        for pair in range(model.npair):
-            if {model.pair_geom1[pair], model.pair_geom2[pair]} == {first, second}:
-                names = ("friction", "solref", "solreffriction", "solimp", "margin", "gap")
-                return {"condim": model.pair_dim[pair]} | {name: getattr(model, f"pair_{name}")[pair] for name in names} | self.overrides
-        types, affinities = model.geom_contype, model.geom_conaffinity
-        bodies = [model.geom_bodyid[geom] for geom in (first, second)]
-        excluded = [(bodies[0] << 16) + bodies[1], (bodies[1] << 16) + bodies[0]]
-        if not (types[first] & affinities[second] or types[second] & affinities[first]) or np.isin(model.exclude_signature, excluded).any():
-            return None
-        both = mixed(self._settings_of(first), self._settings_of(second))
-        return {
-            "condim": both.condim,
-            "solref": np.array(both.solref),
-            "solimp": np.array(both.solimp),
-            "friction": np.array(both.friction)[[0, 0, 1, 2, 2]],
-            "margin": both.margin,
-            "gap": model.geom_gap[[first, second]].sum(),
-        } | self.overrides
-
-    @property
-    def overrides(self) -> dict[str, Any]:
-        """The settings that all contacts have if the flag `override` is set."""
-        option = self.model.opt
-        if not option.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE:
-            return {}
-        return {name: np.array(getattr(option, f"o_{name}")) for name in ("solref", "solimp", "friction", "margin")}
-
-    def _settings_of(self, geom: int) -> GeomSettings:
-        model, names = self.model, ("solref", "solimp", "friction", "condim", "margin", "priority", "solmix")
-        return GeomSettings(**{name: plain(getattr(model, f"geom_{name}")[geom]) for name in names})
-
-
-def plain(value: Any) -> Any:
-    """Numbers of a compiled model as a tuple, or as a number."""
-    return tuple(value.tolist()) if np.ndim(value) else value.item()
 
 
 def set_options(option: Any, compiled: Any, dt: float, changes: Changes) -> None:

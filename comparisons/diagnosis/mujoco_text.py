@@ -10,6 +10,7 @@ import numpy as np
 from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, digits
 from dropspin.comparisons.diagnosis.loose_body import MassProperties
 from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
+from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile
 from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
@@ -84,7 +85,7 @@ class BodyText:
         root, body = self._file.source, self.element
         options = {"timestep": "0.002", "integrator": "Euler", "cone": "pyramidal", "impratio": "1", "density": "0", "viscosity": "0"}
         found = {name: option_setting(root, "option", name, default) for name, default in options.items()}
-        overrides = {name: option_setting(root, "option", f"o_{name}", "") for name in self._file.overrides}
+        of_all = {name: option_setting(root, "option", f"o_{name}", "") for name in overrides(self._file.model)}
         if body is None:
             return found
         places: dict[str, list[Element]] = {"gravcomp": [body]} | dict.fromkeys(OF_JOINT, self._joint)
@@ -98,7 +99,7 @@ class BodyText:
             written["centre"] = [inertial.setting("pos") or next((one.words for one in inertial.every("origin")), inertial.words)]
             written["inertia"] = [inertial.setting(name) for name in names] if tensor is None else [tensor.words]
         # Of several places, the first one counts.
-        return found | {name: one for name, several in written.items() for one in reversed(several) if one} | overrides
+        return found | {name: one for name, several in written.items() for one in reversed(several) if one} | of_all
 
     @cached_property
     def _joint(self) -> list[Element]:

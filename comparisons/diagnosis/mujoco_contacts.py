@@ -1,0 +1,49 @@
+"""Contacts of two geometries of a compiled model of MuJoCo, with the settings that MuJoCo mixes of both."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from dropspin.scenarios.truths.soft_rest import GeomSettings, mixed
+
+
+def contact_of(model: Any, first: int, second: int) -> dict[str, Any] | None:
+    """The settings of a contact of two geometries, as MuJoCo mixes them; None if they do not collide."""
+    for pair in range(model.npair):
+        if {model.pair_geom1[pair], model.pair_geom2[pair]} == {first, second}:
+            names = ("friction", "solref", "solreffriction", "solimp", "margin", "gap")
+            settings = {name: getattr(model, f"pair_{name}")[pair] for name in names}
+            return {"condim": model.pair_dim[pair]} | settings | overrides(model)
+    types, affinities = model.geom_contype, model.geom_conaffinity
+    bodies = [model.geom_bodyid[geom] for geom in (first, second)]
+    excluded = [(bodies[0] << 16) + bodies[1], (bodies[1] << 16) + bodies[0]]
+    if not (types[first] & affinities[second] or types[second] & affinities[first]) or np.isin(model.exclude_signature, excluded).any():
+        return None
+    both = mixed(_settings_of(model, first), _settings_of(model, second))
+    return {
+        "condim": both.condim,
+        "solref": np.array(both.solref),
+        "solimp": np.array(both.solimp),
+        "friction": np.array(both.friction)[[0, 0, 1, 2, 2]],
+        "margin": both.margin,
+        "gap": model.geom_gap[[first, second]].sum(),
+    } | overrides(model)
+
+
+def overrides(model: Any) -> dict[str, Any]:
+    """The settings that all contacts have if the flag `override` is set."""
+    option = model.opt
+    if not option.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE:
+        return {}
+    return {name: np.array(getattr(option, f"o_{name}")) for name in ("solref", "solimp", "friction", "margin")}
+
+
+def _settings_of(model: Any, geom: int) -> GeomSettings:
+    names = ("solref", "solimp", "friction", "condim", "margin", "priority", "solmix")
+    return GeomSettings(**{name: plain(getattr(model, f"geom_{name}")[geom]) for name in names})
+
+
+def plain(value: Any) -> Any:
+    """Numbers of a compiled model as a tuple, or as a number."""
+    return tuple(value.tolist()) if np.ndim(value) else value.item()

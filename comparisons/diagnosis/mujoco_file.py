@@ -223,9 +223,9 @@ class MuJoCoFile:
         return f"{names[planes[0]]} does not hold it, because {why if own else 'the body has no geometry'}"
 
     def _still(self, own: Sequence[int]) -> list[int]:
-        """The geometries of the world beside some and the plane that is added."""
-        left_out = {*own, self.names(GEOM)[ADDED]}
-        still = np.flatnonzero(self.model.body_weldid[self.model.geom_bodyid] == 0)
+        """The geometries of the world beside some and the plane that is added; the root of a URDF is no part of it."""
+        left_out, bodies = {*own, self.names(GEOM)[ADDED]}, self.model.geom_bodyid
+        still = np.flatnonzero((bodies if self.is_urdf else self.model.body_weldid[bodies]) == 0)
         return [geom for geom in still.tolist() if geom not in left_out]
 
     def _collide(self, own: Sequence[int], other: int) -> bool:

@@ -170,6 +170,21 @@ def test_root_of_a_urdf_is_welded_and_cut_loose(tmp_path):
     assert np.diag(body.facts.inertia) == pytest.approx([0.1] * 3)
 
 
+def test_link_of_a_urdf_lands_on_the_plane_that_is_added_and_not_on_the_root(tmp_path):
+    """Only the root of an MJCF file is as fixed as the file says."""
+    mass = '<inertial><mass value="1"/><inertia ixx=".002" iyy=".002" izz=".002" ixy="0" ixz="0" iyz="0"/></inertial>'
+    link = f'<link name="{{}}">{mass}<collision><origin rpy="0 .4 0"/><geometry><box size=".1 .1 .1"/></geometry></collision></link>'
+    joint = '<joint name="j" type="continuous"><parent link="base"/><child link="arm"/><origin xyz="0 0 .2"/><axis xyz="0 0 1"/></joint>'
+    text = f'<robot name="r">{link.format("base")}{link.format("arm")}{joint}</robot>'
+    facts = body_of(tmp_path, text, name="arm", file="arm.urdf").facts
+    assert (facts.surface, facts.unmodelled) == ("a plane with default settings", [])
+    arm = '<body name="arm" pos="0 0 .2"><joint/><geom type="box" size=".1 .1 .1"/></body>'
+    (tmp_path / "arm.xml").write_text(
+        f'<mujoco><worldbody><body name="base"><geom name="foot" type="box" size=".1 .1 .1"/>{arm}</body></worldbody></mujoco>'
+    )
+    assert MuJoCoModel(tmp_path / "arm.xml", "arm.xml").body("arm", None).facts.surface == "foot"
+
+
 def test_welded_parts_and_an_offset_centre_move_as_in_mujoco(tmp_path):
     part = '<body pos=".1 .05 0" euler="0 0 30"><geom type="capsule" size=".02 .05" mass=".3"/></body>'
     joint = '<joint type="free" damping=".01" armature=".02"/>'

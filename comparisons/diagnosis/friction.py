@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import KEPT, MOVES, OF_FALLS, TIPS, UNTURNED, WATCHED, Answer, Finding, judged
+from dropspin.comparisons.diagnosis.answers import KEPT, MOVES, OF_FALLS, TIPS, UNTURNED, WATCHED, Answer, judged
 from dropspin.comparisons.diagnosis.landing import is_at_rest, tilt
 from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
 from dropspin.scenarios.rotations import rotate, unrotate
@@ -21,13 +21,11 @@ SHORT = 0.1
 STOPPED = 1e-3  # m/s, of a ball that rolled at 1 m/s
 WAYS = ("0°", "45°")
 """Directions of a slide, from an axis of the surface."""
-ONE_WAY = 0.05
-"""Relative difference of two distances from which friction depends on direction."""
 
 
 def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The distance in which a body that slides stops, along an axis of the surface and at 45 degrees to it."""
-    facts, causes = body.facts, body.causes.get("slide", ())
+    facts = body.facts
     if not facts.lands or not facts.friction > 0.0 or _is_ball(facts):
         return []
     free, exact = SLIDE**2 / (2.0 * facts.friction * facts.gravity), _stop(facts)
@@ -48,10 +46,6 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         return [answers[0], replace(blank, direction=WAYS[1], physical=math.nan, measured=across[0])]
     if SLIDE / (facts.friction * facts.gravity) < LONG_SLIDE:
         answers = [_of_short_slide(one) for one in answers]
-    turns = min(abs(second / first - 1.0) for first, second in zip(along, across, strict=True)) > ONE_WAY
-    named = {setting for finding in answers[1].findings for setting in finding.settings}
-    if turns and not named & {*causes, "timestep"}:
-        answers[1] = replace(answers[1], findings=(*answers[1].findings, Finding("model", (*causes, "timestep"))))
     return answers
 
 

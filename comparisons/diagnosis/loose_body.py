@@ -76,6 +76,7 @@ class Facts:
         ignored: What the engine read and does not use, or changes: name, what is written, what is in force.
         unmodelled: What the file has beside the body that the simulations leave out.
         missed: A plane of the file that the body falls through, and why; empty if there is none.
+        left_out: What of the file the body collides with, in place of which it lands on a plane that is added; empty if there is nothing.
     """
 
     name: str
@@ -107,6 +108,7 @@ class Facts:
     ignored: Sequence[tuple[str, Setting, str]]
     unmodelled: Sequence[str]
     missed: str = ""
+    left_out: str = ""
 
     @cached_property
     def lowest(self) -> Callable[[Array], Array]:

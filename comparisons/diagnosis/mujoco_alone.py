@@ -15,7 +15,7 @@ import numpy as np
 from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of, overrides, plain
 from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, PLANE, MuJoCoFile, set_options
-from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, mesh_of, quaternion, shape_of
+from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, kind_of, mesh_of, quaternion, shape_of
 from dropspin.comparisons.diagnosis.parts import VOLUMES
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
@@ -42,6 +42,7 @@ class MuJoCoAlone:
         surface: The number of what it lands on; None for nothing.
         others: The numbers of what else it collides with and may land on, unless what it lands on was named.
         missed: A plane of the file that it falls through, and why; empty if there is none.
+        left_out: What else of the world it collides with, if no plane and no box; empty if there is nothing, or what it lands on was named.
         pairs: The settings of the contacts with it, by geometry.
         dof: The number of the first degree of freedom of the free joint; None without one.
     """
@@ -54,11 +55,11 @@ class MuJoCoAlone:
         names = list(file.names(GEOM))
         for geom in self.geoms:
             if int(old.geom_type[geom]) not in map(int, MODELLED):
-                kind = mujoco.mjtGeom(int(old.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
-                raise Breakdown("declined", f"its geometry {names[geom]!r} is of the type {kind}, which is not modelled")
+                raise Breakdown("declined", f"its geometry {names[geom]!r} is a {kind_of(old, geom)}, which is not modelled")
         self.surface = file.surface(on, self.geoms)
         self.others = file.surfaces(self.geoms)[1:] if on is None else []
         self.missed = file.missed(self.geoms)
+        self.left_out = file.left_out(self.geoms) if on is None else ""
         self.pairs: dict[int, dict[str, Any]] = {}
         if self.surface is not None and file.has_contacts:
             contacts = {geom: contact_of(old, geom, self.surface) for geom in self.geoms}

@@ -170,8 +170,9 @@ class MuJoCoBody(LooseBody):
             written=self._text.written,
             settings=self._text.settings,
             ignored=list(self._text.ignored(self._properties, raised=raised, condim=0 if touching is None else int(touching["condim"]))),
-            unmodelled=[*file.unmodelled(alone.head), *start, *tilted],
+            unmodelled=[*file.unmodelled(alone.head), *start, *tilted, *[alone.left_out] * bool(alone.left_out)],
             missed=alone.missed if is_above and file.gravity.any() else "",
+            left_out=alone.left_out,
         )
 
     @cached_property

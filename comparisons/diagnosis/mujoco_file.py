@@ -13,6 +13,7 @@ import numpy as np
 from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mujoco_compiled import placed
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of
+from dropspin.comparisons.diagnosis.mujoco_shapes import kind_of
 from dropspin.comparisons.diagnosis.source import option_setting, read_source
 from dropspin.comparisons.engines.mujoco_simulation import quiet
 from dropspin.scenarios import DropspinError
@@ -30,7 +31,7 @@ ENUMERATIONS = {"RK4": int(mujoco.mjtIntegrator.mjINT_RK4), "elliptic": ELLIPTIC
 """Values of options in the words of MJCF."""
 UNMODELLED = {"nflex": "flexible bodies", "flg_surfacevel": "surface velocities", "flg_adhesion": "adhesion of geometries"}
 OPTIONS = [name for name in dir(mujoco.MjSpec().option) if not name.startswith("_")]
-MOST_NAMES, MOST_KEYS = 20, 3
+MOST_NAMES, MOST_LISTED = 20, 3
 TURNED = 1e-6
 """Difference of |cos(angle / 2)| from 1 up to which two orientations are the same."""
 LEAST = 2e-15
@@ -203,7 +204,7 @@ class MuJoCoFile:
             turn = model.jnt_qposadr[joint] + np.arange(3, 7)
             turned = np.abs(model.key_qpos[:, turn] @ model.qpos0[turn]) < 1.0 - TURNED
             names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_KEY, int(key)) or str(key) for key in np.flatnonzero(turned)]
-            found += [f"the pose of keyframe {', '.join(names[:MOST_KEYS])}{' and others' * (len(names) > MOST_KEYS)}"] * bool(names)
+            found += [f"the pose of keyframe {', '.join(names[:MOST_LISTED])}{' and others' * (len(names) > MOST_LISTED)}"] * bool(names)
         return found
 
     def surfaces(self, own: Sequence[int]) -> list[int]:
@@ -221,6 +222,15 @@ class MuJoCoFile:
             return ""
         why = "contacts are disabled" if not self.has_contacts else "no geometry of the body collides with it"
         return f"{names[planes[0]]} does not hold it, because {why if own else 'the body has no geometry'}"
+
+    def left_out(self, own: Sequence[int]) -> str:
+        """The geometries of the world that some geometries collide with, if none is a plane or a box; empty if there is none."""
+        names = list(self.names(GEOM))
+        found = [geom for geom in self._still(own) if self.has_contacts and self._collide(own, geom)]
+        if any(int(self.model.geom_type[geom]) in map(int, SURFACES) for geom in found):
+            return ""
+        words = [f"the {kind_of(self.model, geom)} {names[geom]}" for geom in found]
+        return f"{', '.join(words[:MOST_LISTED])}{' and others' * (len(words) > MOST_LISTED)}"
 
     def _still(self, own: Sequence[int]) -> list[int]:
         """The geometries of the world beside some and the plane that is added; the root of a URDF is no part of it."""

@@ -15,13 +15,17 @@ MODELLED = [getattr(mujoco.mjtGeom, f"mjGEOM_{kind}") for kind in ("SPHERE", "CA
 STRAIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 
 
+def kind_of(model: Any, number: int) -> str:
+    """The word for the kind of a geometry."""
+    return mujoco.mjtGeom(int(model.geom_type[number])).name.removeprefix("mjGEOM_").lower().replace("hfield", "height field")
+
+
 def shape_of(model: Any, number: int) -> tuple[Shape, Array, Array]:
     """A geometry as a solid of 1 kg, with its centre [m] and its orientation in the frame of the geometry."""
-    size, kind = model.geom_size[number].tolist(), mujoco.mjtGeom(int(model.geom_type[number]))
-    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+    size, name = model.geom_size[number].tolist(), kind_of(model, number)
+    if name == "mesh":
         shape = mesh_shape(*mesh_of(model, number))
         return shape, shape.centre, STRAIGHT
-    name = kind.name.removeprefix("mjGEOM_").lower()
     if name in ("capsule", "cylinder"):  # along y here
         return solid(name, radius=size[0], half_length=size[1]), np.zeros(3), np.roll(UPWARD, -1)
     return solid(name, **({"radius": size[0]} if name == "sphere" else {"half_extents": size})), np.zeros(3), STRAIGHT

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, NOTEWORTHY, REBOUND, Answer, Finding, Kind, Remedy
 from dropspin.comparisons.diagnosis.landing import rebound
-from dropspin.comparisons.diagnosis.loose_body import LooseBody
+from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.running.ablation import shares
 
@@ -31,15 +31,16 @@ class Targets(NamedTuple):
         return {name: value for name, value in ((REBOUND, self.restitution), (COEFFICIENT, self.friction)) if value is not None}
 
     def judged(self, body: LooseBody, answers: Sequence[Answer]) -> Iterator[Answer]:
-        """The answers, those that miss a target with a finding; and one for each target that nothing was measured for."""
-        yield from (self._judged(body, answer) for answer in answers)
-        facts, measured = body.facts, {answer.quantity for answer in answers} if not body.facts.missed else set()
-        why = facts.missed or "the body lands on no surface"
-        if facts.surface and not facts.missed:
-            why = "the simulation broke down" if facts.lands else "gravity does not hold the body on a surface"
+        """The answers, those that miss a target with a finding; and one for each target that nothing was measured for.
+
+        A contact with a plane that is added in place of what the file has is not judged.
+        """
+        is_of_file = not (body.facts.missed or body.facts.left_out)
+        yield from (self._judged(body, answer) if is_of_file else answer for answer in answers)
+        measured = {answer.quantity for answer in answers if is_of_file}
         for quantity in (name for name in self.wanted if name not in measured):
             question = "impact" if quantity == REBOUND else "friction"
-            finding = Finding("target", detail=f"the target is {self.wanted[quantity]:g}, but {why}")
+            finding = Finding("target", detail=f"the target is {self.wanted[quantity]:g}, but {_why_unmeasured(body.facts)}")
             yield Answer(question, quantity, "1", detail="not measured", findings=(finding,))
 
     def meets(self, answer: Answer) -> bool:
@@ -62,6 +63,15 @@ class Targets(NamedTuple):
                     break
         finding = Finding("target", remedies=tuple(remedies), detail=f"the target is {wanted:g}")
         return replace(answer, findings=(*answer.findings, finding))
+
+
+def _why_unmeasured(facts: Facts) -> str:
+    """Why nothing was measured for a target."""
+    if facts.missed or not facts.surface:
+        return facts.missed or "the body lands on no surface"
+    if not facts.lands:
+        return "gravity does not hold the body on a surface"
+    return f"the simulation leaves out {facts.left_out}" if facts.left_out else "the simulation broke down"
 
 
 NO_TARGETS = Targets()

@@ -29,6 +29,35 @@ def test_target_that_nothing_is_measured_for_is_missed(tmp_path, geom, option, w
     assert found == [(REBOUND, f"the target is 0.5, but {why}"), (COEFFICIENT, f"the target is 0.3, but {why}")]
 
 
+GROUNDS = {
+    "the cylinder table": '<geom name="table" type="cylinder" size="1 .1" friction=".2"/>',
+    "the height field geom 0": '<geom type="hfield" hfield="h" friction=".2"/>',
+    "the sphere a, the sphere b, the sphere c and others": "".join(f'<geom name="{name}" size=".1"/>' for name in "abcd"),
+}
+
+
+@pytest.mark.parametrize(("left_out", "ground"), GROUNDS.items())
+def test_ground_that_is_neither_plane_nor_box_is_named_and_targets_are_not_judged_without_it(tmp_path, left_out, ground):
+    asset = '<asset><hfield name="h" nrow="2" ncol="2" size="1 1 .1 .1"/></asset>'
+    world = FREE.format('<geom type="box" size=".05 .05 .05" friction=".2"/>')
+    (tmp_path / "ground.xml").write_text(f"<mujoco>{asset}<worldbody>{ground}{world}</worldbody></mujoco>")
+    diagnosis = diagnose(tmp_path / "ground.xml", friction=0.2)
+    [body] = diagnosis.bodies
+    assert (body.surface, body.unmodelled) == ("a plane with default settings", (left_out,))
+    [(answer, finding)] = [(answer, finding) for answer, finding in body.findings if finding.kind == "target"]
+    assert (answer.quantity, answer.detail) == (COEFFICIENT, "not measured")
+    assert finding.detail == f"the target is 0.2, but the simulation leaves out {left_out}"
+    assert diagnosis.failed
+    assert not diagnose(tmp_path / "ground.xml").failed
+
+
+def test_plane_counts_and_not_what_else_of_the_world_a_body_collides_with(tmp_path):
+    body = body_of(tmp_path, GROUNDS["the cylinder table"] + BALL.format(""))
+    assert (body.facts.surface, body.facts.unmodelled, body.facts.left_out) == ("floor", [], "")
+    targets = list(Targets(None, 1.0).judged(body, [Answer("friction", COEFFICIENT, "1", measured=body.facts.friction)]))
+    assert [finding for answer in targets for finding in answer.findings] == []
+
+
 def test_both_coefficients_of_a_pair_are_judged(tmp_path):
     """MuJoCo's own slides along the two axes take 32 and 64 mm: v²/2µg with 0.4 and 0.2."""
     body = '<body name="b" pos="0 0 1"><freejoint/><geom name="g" type="box" size=".1 .1 .1"/></body>'

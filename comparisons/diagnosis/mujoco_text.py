@@ -13,6 +13,7 @@ from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
 from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile
 from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
+from dropspin.comparisons.diagnosis.urdf_file import for_other_simulators
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
 
@@ -176,10 +177,7 @@ class BodyText:
             yield from self._without_inertial()
             if self._file.model.body_weldid[self._head] == 0:
                 yield "base", Setting("the root link") if element is None else element.words, "welded to the world"
-            for tag, value in IN_FORCE.items():
-                for found in [] if element is None else element.every(tag):
-                    if found.number("value", value) != value:
-                        yield tag, found.words, "not read"
+            yield from self._unread()
 
     def _friction(self, place: int) -> float:
         """A coefficient of friction that the file has; 0 if it has none in this place."""
@@ -198,12 +196,26 @@ class BodyText:
             made = f'counted as {has.mass:.4g} kg by default; its volume has {exact.mass:.4g} kg, which inertia="exact" gives'
             yield "mesh", meshes[0].words if meshes else Setting("a mesh"), made
 
+    @cached_property
+    def _links(self) -> dict[int, Element]:
+        """The links of a URDF file of the body and what is welded to it, by the numbers of the bodies."""
+        links = {link.attributes.get("name", ""): link for link in self._file.source.every("link")}
+        names = {number: mujoco.mj_id2name(self._file.model, BODY, number) for number in self._file.group(self._head)}
+        return {number: links[name] for number, name in names.items() if name in links}
+
+    def _unread(self) -> Iterator[tuple[str, Setting, str]]:
+        """The settings of contacts in a URDF file."""
+        for number, link in self._links.items():
+            of_link = "" if number == self._head else f" of {link.attributes['name']}"
+            unread = [found for tag, value in IN_FORCE.items() for found in link.every(tag) if found.number("value", value) != value]
+            for found in (*unread, *for_other_simulators(link)):
+                yield f"{found.tag}{of_link}", found.words, "not read"
+
     def _without_inertial(self) -> Iterator[tuple[str, Setting, str]]:
         """The links of a URDF file, of the body and what is welded to it, of which the mass follows from the geometries."""
-        links = {link.attributes.get("name", ""): link for link in self._file.source.every("link")}
-        for number in self._file.group(self._head):
-            link, mass = links.get(mujoco.mj_id2name(self._file.model, BODY, number)), self._file.model.body_mass[number]
-            if link is not None and mass > 0.0 and next(link.every("inertial"), None) is None:
+        for number, link in self._links.items():
+            mass = self._file.model.body_mass[number]
+            if mass > 0.0 and next(link.every("inertial"), None) is None:
                 words = Setting(f"no inertial in link {link.attributes['name']}", link.file, link.line)
                 yield "inertial", words, f"missing: the mass is {mass:.4g} kg, that of the geometries at the default density"
 

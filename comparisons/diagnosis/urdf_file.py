@@ -1,6 +1,6 @@
 """A URDF file: its links, what is fixed to what, and a file of one link that is cut loose."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -12,6 +12,9 @@ from dropspin.scenarios.text import printable
 
 FIXED = ("fixed", "floating")
 """Types of joints of which PyBullet makes fixed ones."""
+
+OF_OTHERS = ("mu1", "mu2", "kp", "kd", "drake:mu_static", "drake:mu_dynamic")
+"""Elements by which Gazebo and Drake read settings of contacts."""
 
 
 class UrdfFile:
@@ -84,6 +87,15 @@ class UrdfFile:
         name = filename.removeprefix("package://").removeprefix("model://")
         places = [Path.cwd(), *self.path.resolve().parents]
         return next((str(place / name) for place in places if (place / name).is_file()), name)
+
+
+def for_other_simulators(link: Element) -> Iterator[Element]:
+    """The settings of a link's contacts that Gazebo and Drake alone read, those in <gazebo> elements of the file too."""
+    name, robot = link.attributes.get("name"), link.parent
+    yield from link.every(*OF_OTHERS)
+    for element in [] if robot is None else robot.children:
+        if element.tag == "gazebo" and element.attributes.get("reference", name) == name:
+            yield from element.every(*OF_OTHERS)
 
 
 def _end(joint: Element, which: str) -> str:

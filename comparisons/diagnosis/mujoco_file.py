@@ -15,6 +15,7 @@ from dropspin.comparisons.diagnosis.mujoco_compiled import placed
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of
 from dropspin.comparisons.diagnosis.mujoco_shapes import kind_of
 from dropspin.comparisons.diagnosis.source import option_setting, read_source
+from dropspin.comparisons.diagnosis.urdf_file import verify_one_root
 from dropspin.comparisons.engines.mujoco_simulation import quiet
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
@@ -50,13 +51,15 @@ class MuJoCoFile:
         given: Its name for messages.
 
     Raises:
-        DropspinError: MuJoCo does not compile it.
+        DropspinError: MuJoCo does not compile it, or it is a URDF file that does not have exactly one root link.
     """
 
     def __init__(self, path: Path, given: str) -> None:
         self.source, self.given = read_source(path), given
         self.is_urdf = self.source.tag == "robot"
         self.refusal = ""
+        if self.is_urdf:
+            verify_one_root(self.source, given)
         try:
             with quiet():
                 self.model = self._compiled(path)

@@ -32,10 +32,8 @@ class UrdfFile:
         self.path, self.given = path, given
         source = read_source(path)
         self.links = {printable(link.attributes.get("name", "")): link for link in source.children if link.tag == "link"}
-        self._parents = {_end(joint, "child"): joint for joint in source.children if joint.tag == "joint"}
-        roots = [name for name in self.links if name not in self._parents]
-        if len(roots) != 1:  # PyBullet ends the process
-            raise DropspinError(f"{given}: has {len(roots)} links without a parent ({', '.join(roots[:5])}); a URDF file has one.")
+        self._parents = _parents(source)
+        verify_one_root(source, given)
 
     @cached_property
     def heads(self) -> dict[str, list[str]]:
@@ -87,6 +85,24 @@ class UrdfFile:
         name = filename.removeprefix("package://").removeprefix("model://")
         places = [Path.cwd(), *self.path.resolve().parents]
         return next((str(place / name) for place in places if (place / name).is_file()), name)
+
+
+def verify_one_root(source: Element, given: str) -> None:
+    """Refuse a URDF file that does not have exactly one root link: PyBullet ends the process, MuJoCo welds all roots to the world.
+
+    Raises:
+        DropspinError: It has another number of them.
+    """
+    parents = _parents(source)
+    names = [printable(link.attributes.get("name", "")) for link in source.children if link.tag == "link"]
+    roots = [name for name in names if name not in parents]
+    if len(roots) != 1:
+        raise DropspinError(f"{given}: has {len(roots)} links without a parent ({', '.join(roots[:5])}); a URDF file has one.")
+
+
+def _parents(source: Element) -> dict[str, Element]:
+    """The joint between each link and its parent, by the name of the link."""
+    return {_end(joint, "child"): joint for joint in source.children if joint.tag == "joint"}
 
 
 def for_other_simulators(link: Element) -> Iterator[Element]:

@@ -223,6 +223,7 @@ def test_welded_parts_and_an_offset_centre_move_as_in_mujoco(tmp_path):
         ("<mujoco/>", "no body both moves and has mass"),
         ('<mujoco><worldbody><body name="arm"><joint/><geom size=".1"/></body></worldbody></mujoco>', "--loose"),
         ('<robot name="r"><link name="b"/></robot>', "give a link a mass above 0"),
+        ('<robot name="r"><link name="a"/><link name="b"/></robot>', r"has 2 links without a parent \(a, b\); a URDF file has one"),
         ('<robot name="r"><xacro:property name="m" value="1"/></robot>', "has macros; expand them first"),
         ('<?xml version="1.0" encoding="ISO-8859-1"?><mujoco model="\xe9"/>'.encode("latin-1"), "is not encoded as UTF-8"),
     ],

@@ -15,7 +15,7 @@ from dropspin.comparisons.diagnosis.mujoco_compiled import placed
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of
 from dropspin.comparisons.diagnosis.mujoco_shapes import kind_of
 from dropspin.comparisons.diagnosis.source import option_setting, read_source
-from dropspin.comparisons.diagnosis.urdf_file import verify_one_root
+from dropspin.comparisons.diagnosis.urdf_file import package_remedy, verify_one_root
 from dropspin.comparisons.engines.mujoco_simulation import quiet
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
@@ -64,7 +64,8 @@ class MuJoCoFile:
             with quiet():
                 self.model = self._compiled(path)
         except (ValueError, mujoco.FatalError) as error:
-            raise DropspinError(f"{given}: MuJoCo does not compile it: {one_line(error)}.") from None
+            remedy = package_remedy(self.source) if "opening file" in str(error) else ""
+            raise DropspinError(f"{given}: MuJoCo does not compile it: {one_line(error)}{remedy}.") from None
         if not 0.0 < self.model.opt.timestep <= LONGEST_STEP:
             written = option_setting(self.source, "option", "timestep", "")
             raise DropspinError(f"{given}: {written}: a time step must be above 0 and at most {LONGEST_STEP:g} s.")

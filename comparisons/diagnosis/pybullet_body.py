@@ -19,7 +19,7 @@ from dropspin.comparisons.diagnosis.parts import Part, Support, at_point
 from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Ignored, read_links
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.source import Setting
-from dropspin.comparisons.diagnosis.urdf_file import UrdfFile
+from dropspin.comparisons.diagnosis.urdf_file import UrdfFile, package_remedy
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.pybullet_simulation import CHUNK, Z_TO_Y
@@ -67,7 +67,11 @@ class PyBulletModel(UrdfFile):
     def __init__(self, path: Path, given: str) -> None:
         super().__init__(path, given)
         server().clear()
-        load(given, str(path))
+        try:
+            load(given, str(path))
+        except DropspinError as error:
+            remedy = package_remedy(self.source) if "cannot find" in str(error) else ""
+            raise DropspinError(f"{str(error).removesuffix('.')}{remedy}.") from None
 
     def body(self, name: str, on: str | None) -> LooseBody:
         """One of the bodies, above what it lands on."""

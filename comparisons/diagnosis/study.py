@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -36,7 +36,6 @@ READERS = {".xml": ("mujoco",), ".mjcf": ("mujoco",), ".urdf": ("mujoco", "pybul
 MESH = """<mujoco><asset><mesh name="mesh" file="{path}" inertia="{inertia}"/></asset><worldbody>
 <body name="{name}"><freejoint/><geom type="mesh" mesh="mesh" density="{density:g}"/></body></worldbody></mujoco>"""
 """A model with a body whose only geometry is a mesh."""
-Found = TypeVar("Found")
 OF_FACTS = ("name", "engine", "version", "dt", "mass", "surface", "friction", "friction_across")
 """What a diagnosis has as an engine has it in force."""
 QUESTIONS: tuple[Question, ...] = (fall, spin, tumble, worst_tumble, impact, rest, slide, creep, roll)
@@ -167,11 +166,8 @@ def diagnose(
         entries = [present_entry(engine) for engine in chosen]
         with started_crews(1, 1, entries, resources) as crews:
             read = [(entry, crews[0].call(entry, _bodies, path, given, wanted, loose)) for entry in entries]
-        refused = [one for one in read if isinstance(one[1], DropspinError)]
-        readers = [one for one in read if one not in refused] or read
-        pieces = [(entry, name) for entry, names in readers for name in _checked(given, names)]
-        names = dict.fromkeys(name for _, name in pieces)
-        refusals = [BodyDiagnosis(name, entry.label, breakdown=str(why), declined=True) for entry, why in refused for name in names]
+        pieces = [(entry, name) for entry, names in read if isinstance(names, list) for name in names]
+        refusals = _refusals(given, read)
         with started_crews(jobs, len(pieces), entries, resources) as crews:
 
             def of_body(piece: tuple[EngineEntry, str], processes: EngineProcesses, report: Callable[[str], None]) -> BodyDiagnosis:
@@ -189,13 +185,20 @@ def diagnose(
             return Diagnosis(given, tuple(found))
 
 
-def _checked(given: str, found: Found | DropspinError | Breakdown) -> Found:
-    """What was found in an engine's process, unless the file is at fault."""
-    if isinstance(found, Breakdown):
-        raise DropspinError(f"{given}: cannot be read: {found.reason}.")
-    if isinstance(found, DropspinError):
-        raise found
-    return found
+def _refusals(given: str, read: Sequence[tuple[EngineEntry, list[str] | DropspinError | Breakdown]]) -> list[BodyDiagnosis]:
+    """The bodies that some engines read, each without a result of every engine that refused the file or broke down on reading it.
+
+    Raises:
+        DropspinError: No engine read the file; of several that refused it, the reason of the first.
+    """
+    refused = [(entry.label, str(why), True) for entry, why in read if isinstance(why, DropspinError)]
+    unread = "{}: cannot be read with {}: {}.".format
+    broken = [(entry.label, unread(given, entry.label, why.reason), False) for entry, why in read if isinstance(why, Breakdown)]
+    names = dict.fromkeys(name for _, found in read if isinstance(found, list) for name in found)
+    if not names:
+        raise DropspinError(" ".join(why for _, why, _ in [*refused[:1], *broken]))
+    failed = [*refused, *broken]
+    return [BodyDiagnosis(name, label, breakdown=why, declined=declined) for label, why, declined in failed for name in names]
 
 
 @lru_cache(maxsize=1)

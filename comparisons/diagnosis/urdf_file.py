@@ -16,6 +16,9 @@ FIXED = ("fixed", "floating")
 OF_OTHERS = ("mu1", "mu2", "kp", "kd", "drake:mu_static", "drake:mu_dynamic")
 """Elements by which Gazebo and Drake read settings of contacts."""
 
+PACKAGES = ("package://", "model://")
+"""How ROS and Gazebo begin paths in folders that they look up."""
+
 
 class UrdfFile:
     """A URDF file.
@@ -30,10 +33,10 @@ class UrdfFile:
 
     def __init__(self, path: Path, given: str) -> None:
         self.path, self.given = path, given
-        source = read_source(path)
-        self.links = {printable(link.attributes.get("name", "")): link for link in source.children if link.tag == "link"}
-        self._parents = _parents(source)
-        verify_one_root(source, given)
+        self.source = read_source(path)
+        self.links = {printable(link.attributes.get("name", "")): link for link in self.source.children if link.tag == "link"}
+        self._parents = _parents(self.source)
+        verify_one_root(self.source, given)
 
     @cached_property
     def heads(self) -> dict[str, list[str]]:
@@ -82,9 +85,18 @@ class UrdfFile:
 
     def _mesh(self, filename: str) -> str:
         """The path of a mesh, looked for as PyBullet does: in the folders above the file."""
-        name = filename.removeprefix("package://").removeprefix("model://")
+        name = filename.removeprefix(PACKAGES[0]).removeprefix(PACKAGES[1])
         places = [Path.cwd(), *self.path.resolve().parents]
         return next((str(place / name) for place in places if (place / name).is_file()), name)
+
+
+def package_remedy(source: Element) -> str:
+    """The end of a sentence on a mesh that is not found: what to do with the first path in a package; empty if there is none."""
+    for mesh in source.every("mesh"):
+        for beginning in PACKAGES:
+            if mesh.attributes.get("filename", "").startswith(beginning):
+                return f"; replace {beginning} in line {mesh.line} by the path of the folder that has the package"
+    return ""
 
 
 def verify_one_root(source: Element, given: str) -> None:

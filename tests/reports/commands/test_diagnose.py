@@ -126,3 +126,37 @@ def test_message_of_an_engine_that_refuses_a_file_is_not_lost(model):
     message = " ".join(done.stderr.split())
     assert "bad format in attribute 'size'" in message
     assert "PyBullet gives link b the mass 1 kg and the moments 0, 0, 0 kg m²" in message
+
+
+LINK = """<robot name="r"><link name="b"><inertial><mass value="1"/><inertia ixx=".1" ixy="0" ixz="0" iyy=".1" iyz="0" izz=".1"/></inertial>
+<collision><geometry>{}</geometry></collision></link></robot>"""
+
+
+@pytest.mark.parametrize("path", ["package://arm/b.stl", "model://arm/b.stl", "arm/b.stl"])
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
+def test_path_of_a_mesh_in_a_package_has_a_remedy(tmp_path, path, engine):
+    pytest.importorskip(engine, exc_type=ImportError)
+    (tmp_path / "arm.urdf").write_text(LINK.format(f'<mesh filename="{path}"/>'))
+    done = dropspin("diagnose", "arm.urdf", "-e", engine, cwd=tmp_path)
+    assert done.returncode == 2
+    beginning, is_in_package, _ = path.partition("://")
+    remedy = f"; replace {beginning}:// in line 2 by the path of the folder that has the package."
+    assert (remedy in " ".join(done.stderr.split())) is bool(is_in_package)
+
+
+@pytest.mark.parametrize(("geometry", "code"), [('<box size="1 1 1"/>', 3), ('<box size="0,2 0,1 0,06"/>', 2)])
+def test_engine_that_breaks_down_on_reading_a_file_is_named_beside_what_the_other_finds(tmp_path, monkeypatch, geometry, code):
+    """What MuJoCo measures, or why it refuses the file; an empty mesh ends PyBullet's process."""
+    bodies = pytest.importorskip("dropspin.comparisons.diagnosis.pybullet_body", exc_type=ImportError)
+
+    def break_down(*arguments):
+        raise RuntimeError("no mesh")
+
+    monkeypatch.setattr(bodies, "load", break_down)
+    file = f"box{code}.urdf"  # files of one name are read once
+    (tmp_path / file).write_text(LINK.format(geometry))
+    done = dropspin("diagnose", file, cwd=tmp_path, COLUMNS="200")
+    assert done.returncode == code
+    said = " ".join((done.stdout if code == 3 else done.stderr).split())
+    assert f"{file}: cannot be read with pybullet: RuntimeError: no mesh." in said
+    assert ("b: box, 1 kg; MuJoCo" if code == 3 else f"{file}: MuJoCo does not compile it: ") in said

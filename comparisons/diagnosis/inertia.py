@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import Answer, Finding, Remedy, digits, vector_text
-from dropspin.comparisons.diagnosis.loose_body import Facts, MassProperties
+from dropspin.comparisons.diagnosis.loose_body import ROUNDING, Facts, MassProperties
 from dropspin.scenarios.bodies.inertia import mean_squares
 from dropspin.scenarios.bodies.possible_moments import largest_multiple
 from dropspin.scenarios.bodies.shape import INERTIA_ROUNDING
@@ -47,9 +47,8 @@ def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | Non
             return
         off = np.zeros(3) if solid is None else solid.centre - given.centre
         if off.any() and _excess(points - off, squares) <= INERTIA_ROUNDING:
-            remedy = Remedy(
-                f"the centre of mass of a uniform solid, which is displaced by ({digits(off.tolist())}) m along the body's axes"
-            )
+            shown = digits(np.where(np.abs(off) > ROUNDING * np.abs(off).max(), off, 0.0))
+            remedy = Remedy(f"the centre of mass of a uniform solid, which is displaced by ({shown}) m along the body's axes")
             finding = Finding("impossible", ("centre",), (remedy,), "less for these moments, this mass and shape")
             yield Answer(
                 "inertia", "distance of the centre of mass from a solid's", "m", measured=float(np.linalg.norm(off)), findings=(finding,)

@@ -21,7 +21,7 @@ from dropspin.scenarios.truths.settings import Resistance, fall, free_motion, sp
 
 SETTLED = 3.0  # s
 STILL = np.zeros(3)
-ROUNDING = 1e-14  # of products of inertia, relative to the moments
+ROUNDING = 1e-14  # of products of inertia, relative to the moments, and of components, relative to the largest
 Changes = Mapping[str, str | float]
 """Settings to change, by name: those of `LooseBody.remedies`."""
 

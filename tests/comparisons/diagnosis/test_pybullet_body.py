@@ -133,6 +133,13 @@ def test_an_inertia_that_is_not_in_force_is_named(tmp_path):
     assert named(answers, "largest moment / sum of others").measured == pytest.approx(1.25)
 
 
+def test_displacement_of_a_centre_of_mass_has_no_digits_of_rounding(tmp_path):
+    """The inertial frame is turned by 0.5 rad, so that a displacement without y has y = 3e-17 m."""
+    off = body(tmp_path, link('<box size=".1 .1 .1"/>', at='<origin xyz=".2 0 0" rpy="0 0 .5"/>', moments=(0.00167, 0.002, 0.003)))
+    [answer] = [answer for answer in inertia(off.facts) if answer.findings]
+    assert "displaced by (-0.2, 0, 0) m" in answer.findings[0].remedies[0].text
+
+
 def test_restitution_is_the_product_with_that_of_the_plane(tmp_path):
     ball = body(tmp_path, link(BALL, extra='<contact>\n<restitution value="0.5"/></contact>'))
     assert ball.facts.restitution == 0.0

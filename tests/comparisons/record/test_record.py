@@ -321,7 +321,7 @@ def test_the_plan_names_engines_with_canonical_labels():
         assert [ds.engine(label).label for label in plan.engines[name].labels] == list(plan.engines[name].labels)
     assert plan.engines["mjx"].requirements("3.3.0") == ["mujoco-mjx==3.3.0", "mujoco==3.3.0"]
     assert plan.engines["newton"].requirements("1.0.0") == ["newton[sim]==1.0.0"]
-    assert plan.engines["pybullet"].requirements("3.2.6") == ["pybullet==3.2.6", "numpy<2", "pandas<3"]
+    assert plan.engines["pybullet"].requirements("3.2.6") == ["pybullet==3.2.6", "numpy<2", "pandas<3", "pyarrow<26"]
     assert plan.engines["pybullet"].requirements("3.2.7") == ["pybullet==3.2.7"]
     assert plan.engines["rapier-js"].requirements("0.20.0") == ["@dimforge/rapier3d-compat@0.20.0"]
     assert plan.engines["cannon-es"].requirements("0.20.0") == ["cannon-es@0.20.0"]

@@ -94,7 +94,7 @@ class Convergence:
         order_tolerance: The change of the order if each error to which it is fitted changes by its tolerance.
         is_open: Whether more time steps may decide the cause.
         remark: Which time steps or options were added to the requested ones.
-        finest_error: The error at the finest time step; NaN if it is not resolved.
+        finest_error: The error at the finest time step; NaN if it is not resolved, or if there are too few time steps.
     """
 
     budget: ErrorBudget
@@ -139,7 +139,7 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     deciding = budget if vector is None or budget.cause != "discretisation" else vector
     is_open = deciding.cause == "unresolved" and has_value and float(np.nanmax(np.abs(errors))) > floor
     finest = min(series, key=lambda point: point.dt)
-    return Convergence(budget, finest.dt, order_tolerance, is_open, remark, finest.average.value)
+    return Convergence(budget, finest.dt, order_tolerance, is_open, remark, finest.average.value if is_sufficient(list(dts)) else math.nan)
 
 
 def beside_recording(result: Convergence, uncertainty: float) -> Convergence:
@@ -176,6 +176,13 @@ def of_jump(found: Convergence, others: Sequence[tuple[Metric, Cause, Sequence[S
         return found
     reason = "stays at its value at these time steps, from which it may jump: no other error is one of the model, and a large one falls"
     return replace(found, budget=replace(found.budget, cause="unresolved", reason=reason, lower=min(found.budget.lower, 0.0)))
+
+
+def is_refuted(found: Convergence, finer: Convergence) -> bool:
+    """Whether a finer time step shows that a model error is none: it vanishes, or is nearer to 0 there than its interval as dt → 0."""
+    nearest = max(found.budget.lower, -found.budget.upper)
+    is_nearer = finer.budget.cause == "unresolved" and abs(finer.finest_error) < nearest
+    return is_nearer or finer.budget.cause not in ("model", "unresolved")
 
 
 def _corrected(length: ErrorBudget, vector: ErrorBudget, finest: float) -> ErrorBudget:
@@ -219,7 +226,8 @@ def _worse(largest: Judged, other: Judged, floor: float) -> Judged:
 
 
 def _reach(budget: ErrorBudget) -> float:
-    return max(-budget.lower, budget.upper)
+    """The largest error that may remain; 0 if it is not known, so that what is known of other parts counts."""
+    return 0.0 if math.isnan(budget.asymptotic_error) else max(-budget.lower, budget.upper)
 
 
 def _worst_parts(series: Sequence[SeriesPoint]) -> tuple[list[Part], dict[Part, float]]:
@@ -231,7 +239,7 @@ def _worst_parts(series: Sequence[SeriesPoint]) -> tuple[list[Part], dict[Part, 
     finest = (resolved or sorted(series, key=lambda point: point.dt))[0].average.parts
     sizes, dts = np.abs(finest), [[point.dt for point in resolved if len(point.average.parts) > flight] for flight in range(len(finest))]
     of_enough = sizes[: sum(map(is_sufficient, dts))]
-    if not of_enough.max(initial=0.0) > LARGE_SHARE * sizes.max():
+    if not of_enough.size or of_enough.max() < LARGE_SHARE * sizes.max():
         return _with_other_sign(_largest(sizes), finest), {}
     alike = [np.abs(point.average.parts[: len(of_enough)]) for point in resolved if point.average.parts.ndim == finest.ndim]
     largest = list(dict.fromkeys(part for sizes in [of_enough, *alike] for part in _with_other_sign(_largest(sizes), finest)))

@@ -116,7 +116,7 @@ def falls_ever_faster(h: Array, e: Array, small: Array) -> bool:
     """
     sizes = e * np.sign(e[-1])
     falls = np.diff(sizes) / np.diff(np.log(h))
-    is_noticeable = sizes[-2] - sizes[-1] > max(NOTICEABLE * sizes[-1], ABOVE_NOISE * small[-1])
+    is_noticeable = sizes[-2] - sizes[-1] > max(NOTICEABLE * sizes[-1], ABOVE_NOISE * np.hypot(*small[-2:]))
     return bool(is_noticeable and (falls >= 0.0).all() and (np.diff(falls) > 0.0).all())
 
 

@@ -237,11 +237,15 @@ def _outcome(bug: Bug, release: str, folder: Path, stopping: Event) -> Outcome:
             table = load_results(f"{output}/run", arrays=False).table
         except DropspinError:
             return Outcome(release=release, state="not run", said=f"exit code {code}: {without_paths(last_line(printed))}")
-    rows = table[(table["metric"] == bug.metric) & table["kind"].isin(("truth", "invariant"))]
-    if rows.empty or rows["value"].isna().all():
-        broken = table[table["reason"] != ""]["reason"]
-        return Outcome(release=release, state="not run", said=str(broken.iloc[0]) if len(broken) else "it has no value")
-    control = rows["scene"] == bug.right_in
-    [value, right] = [float(of["value"].iloc[0]) if len(of) else math.nan for of in (rows[~control], rows[control])]
-    said = re.search(r"^✗ (\S+ · .+)$", printed, re.MULTILINE)
-    return Outcome(release=release, state=state_of(bug, value, right), value=value, right=right, said=said[1] if said else "")
+    measured = (table["metric"] == bug.metric) & table["kind"].isin(("truth", "invariant"))
+    values = []
+    for of_scene in [table["scene"] != bug.right_in, *[table["scene"] == bug.right_in] * bool(bug.right_in)]:
+        found = table[measured & of_scene]["value"].dropna()
+        if found.empty:
+            broken = table[of_scene & (table["reason"] != "")]["reason"]
+            return Outcome(release=release, state="not run", said=str(broken.iloc[0]) if len(broken) else "it has no value")
+        values.append(float(found.iloc[0]))
+    [value, right] = values if bug.right_in else [*values, math.nan]
+    failures = re.findall(r"^✗ ((\S+) · .+)$", printed, re.MULTILINE)
+    said = [words for words, scene in failures if scene != bug.right_in]
+    return Outcome(release=release, state=state_of(bug, value, right), value=value, right=right, said=said[0] if said else "")

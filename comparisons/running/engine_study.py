@@ -19,6 +19,7 @@ from dropspin.comparisons.judging.convergence import (
     SeriesPoint,
     beside_recording,
     convergence,
+    is_refuted,
     of_jump,
 )
 from dropspin.comparisons.judging.judge import judge, judge_asymptotic_error, judge_order
@@ -215,8 +216,8 @@ class EngineStudy:
             2. coarser      if these leave the cause open, coarser steps are added. Their result counts if the cause was unresolved, or if
                             the model is the cause now
             3. finer        before a model error fails, a finer step is added, because a method can be unstable above some time step, or
-                            its error as large as it can be, which looks like an error that no time step removes. Its result counts unless
-                            the model is still the cause
+                            its error as large as it can be, which looks like an error that no time step removes. Its result counts if
+                            the error vanishes, or if it is nearer to 0 at the finer step than it would be as dt → 0
             4. refined      an error that does not vanish with the time step alone, but together with the options that set the accuracy of
                             the engine, is attributed to these options
             5. calibrated   a model error is a setting error if the engine with calibrated settings has none or a smaller one
@@ -234,14 +235,15 @@ class EngineStudy:
             finest = min((outcome for outcome in self.outcomes if name in outcome.points), key=lambda outcome: outcome.case.dt)
             self.causes[name] = beside_recording(found, finest.run.uncertainties[name])
             return self.causes[name]
-        if found.is_open:
-            longer = self._longer(metric, [factor * max(dts) for factor in ADDED_STEPS])
+        coarser = [factor * max(dts) for factor in ADDED_STEPS] if found.is_open else []
+        if coarser:
+            longer = self._longer(metric, coarser)
             if longer is not None and (found.budget.cause == "unresolved" or longer.budget.cause == "model"):
                 found = longer
-        if found.budget.cause == "model":
-            error = judge_asymptotic_error(scene, self.claim, metric, found)
-            longer = self._longer(metric, [min(dts) / 2.0]) if error is not None and error.verdict == "failed" else None
-            if longer is not None and longer.budget.cause != "model":
+        error = judge_asymptotic_error(scene, self.claim, metric, found)
+        if found.budget.cause == "model" and error is not None and error.verdict == "failed":
+            longer = self._longer(metric, [*coarser, min(dts) / 2.0])
+            if longer is not None and is_refuted(found, longer):
                 found = longer
         if engine.accuracy and found.budget.cause in ("model", "unresolved") and not math.isnan(found.budget.asymptotic_error):
             found = self._attributed_to_options(metric, found, engine.refined(dts))

@@ -51,7 +51,7 @@ def _sentence(row: Row) -> str:
     if cause == "unresolved":
         if row["unit"] == "rad" and abs(value) > SATURATION:
             return "Undecided: the angle is near π, where it saturates."
-        return "Undecided: too few usable time steps." if math.isnan(limit) else f"Undecided: {row['reason_of_limit']}."
+        return f"Undecided: {row['reason_of_limit'] if isinstance(row['reason_of_limit'], str) else 'too few usable time steps'}."
     if cause == "rounding":
         return "Within rounding error."
     if cause == "discretisation":

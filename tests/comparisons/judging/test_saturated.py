@@ -7,8 +7,8 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from dropspin.comparisons.judging.convergence import Claim, SeriesPoint, convergence
-from dropspin.comparisons.judging.error_budget import error_budget
+from dropspin.comparisons.judging.convergence import Claim, Convergence, SeriesPoint, convergence, is_refuted
+from dropspin.comparisons.judging.error_budget import ErrorBudget, error_budget
 from dropspin.comparisons.judging.judge import judge_asymptotic_error
 from dropspin.comparisons.measuring.metric import Average
 
@@ -113,3 +113,49 @@ def test_impact_within_the_first_step_is_no_model_error():
     results = ds.run(ball, "mujoco", [4e-3, 2e-3, 1e-3])
     assert results.exit_code() == 0
     assert results.asymptotic_errors("model").empty
+
+
+def test_finer_step_without_a_usable_error_refutes_no_model_error():
+    """An orientation that is wrong by 2.82 rad at 1 ms saturates at 0.5 ms."""
+
+    class Turned(made.Exact):
+        name = "turned"
+
+        def prepare(self, scene, dt):
+            return made.ExactSimulation(scene, dt, made.turned_by(2.86 - 40.0 * dt))
+
+    scene = ds.load("fall-spin").model_copy(update={"duration": 0.2, "expect": ()})
+    results = ds.run(scene, Turned(), [4e-3, 2e-3, 1e-3])
+    assert results.statuses()["fall-spin"]["turned"].verdict == "failed"
+    assert results.asymptotic_errors("model")["metric"].tolist() == ["orientation_error"]
+
+
+@pytest.mark.parametrize(
+    ("cause", "finest", "expected"),
+    [
+        ("discretisation", 0.45, True),
+        ("unresolved", 0.3, True),
+        ("unresolved", -0.3, True),
+        ("unresolved", 0.45, False),
+        ("unresolved", math.nan, False),
+        ("model", 0.3, False),
+    ],
+)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_model_error_is_refuted_by_a_finer_error_that_vanishes_or_is_nearer_to_0(cause, finest, expected, sign):
+    """Its interval is 0.4 to 0.6, of either sign; what is undecided at an error within it refutes nothing."""
+    found = Convergence(ErrorBudget("model", "", 0.5 * sign, *sorted([0.4 * sign, 0.6 * sign])), 1e-3)
+    finer = Convergence(ErrorBudget(cause, "", 0.0, -1.0, 1.0), 5e-4, finest_error=finest)
+    assert is_refuted(found, finer) == expected
+
+
+def test_errors_of_exactly_0_at_the_finest_step_are_not_within_rounding_at_every_step():
+    found = flights("energy_error", [[0.0, 0.0], [0.56, 0.0]], [[0.0, 0.0], [0.56, 0.0]], [[0.0, 0.0], [0.0, 0.0]])
+    assert (found.cause, found.upper > 0.1) == ("unresolved", True)
+
+
+def test_model_error_beside_a_flight_whose_error_saturates_is_stated():
+    """The second flight is wrong by 3 rad at every step, which measures nothing; the first one approaches 0.5 rad."""
+    box = ds.load("drop-box-corner")
+    found, _ = judged(box, "angular_momentum_direction_error", {dt: [0.5 + 0.01 * dt, 3.0] for dt in (4e-3, 2e-3, 1e-3)})
+    assert (found.budget.cause, found.budget.asymptotic_error) == ("model", pytest.approx(0.5, abs=0.01))

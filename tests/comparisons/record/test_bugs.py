@@ -3,7 +3,9 @@
 import json
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
+import pandas as pd
 import pytest
 from support.cli import dropspin
 
@@ -109,6 +111,21 @@ def test_an_environment_that_cannot_be_made_is_named_and_not_kept(tmp_path, monk
     prepare([bug], tmp_path, messages.append)
     assert messages == ["mujoco 0.0.1: not installable: no such release"]
     assert measure([bug], tmp_path, jobs=1, on_done=lambda *one: None)[bug.name][0].state == "not run"
+
+
+@pytest.mark.parametrize(("broken", "other"), [("slide-box-askew", "slide-box"), ("slide-box", "slide-box-askew")])
+def test_a_breakdown_in_either_scene_is_no_other_value(broken, other, tmp_path, monkeypatch):
+    """The reason is that of the scene that broke down, beside one that has a value."""
+    [bug] = load_bugs(["pybullet-friction-by-direction"])
+    rows = [
+        {"scene": other, "metric": bug.metric, "kind": "truth", "value": 1e-3, "reason": "of the other scene"},
+        {"scene": broken, "metric": "", "kind": "", "value": float("nan"), "reason": "crashed: no such option"},
+    ]
+    monkeypatch.setattr("dropspin.comparisons.record.bugs._python", lambda *release: "python")
+    monkeypatch.setattr("dropspin.comparisons.record.bugs.run", lambda command, stopping: (3, ""))
+    monkeypatch.setattr("dropspin.comparisons.record.bugs.load_results", lambda *where, arrays: SimpleNamespace(table=pd.DataFrame(rows)))
+    for outcome in measure([bug], tmp_path, jobs=1, on_done=lambda *one: None)[bug.name]:
+        assert (outcome.state, outcome.said) == ("not run", "crashed: no such option")
 
 
 @pytest.mark.extended

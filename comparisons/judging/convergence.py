@@ -179,10 +179,13 @@ def of_jump(found: Convergence, others: Sequence[tuple[Metric, Cause, Sequence[S
 
 
 def is_refuted(found: Convergence, finer: Convergence) -> bool:
-    """Whether a finer time step shows that a model error is none: it vanishes, or is nearer to 0 there than its interval as dt → 0."""
-    nearest = max(found.budget.lower, -found.budget.upper)
-    is_nearer = finer.budget.cause == "unresolved" and abs(finer.finest_error) < nearest
-    return is_nearer or finer.budget.cause not in ("model", "unresolved")
+    """Whether a finer time step shows that a model error is none.
+
+    The error vanishes; or it is undecided, and nearer to 0 than its estimate as dt → 0 was, by more than the error before differs from that.
+    """
+    estimate = abs(found.budget.asymptotic_error)
+    is_nearer = estimate - abs(finer.finest_error) > abs(estimate - abs(found.finest_error))
+    return finer.budget.cause not in ("model", "unresolved") or (finer.budget.cause == "unresolved" and is_nearer)
 
 
 def _corrected(length: ErrorBudget, vector: ErrorBudget, finest: float) -> ErrorBudget:

@@ -217,7 +217,7 @@ class EngineStudy:
                             the model is the cause now
             3. finer        before a model error fails, a finer step is added, because a method can be unstable above some time step, or
                             its error as large as it can be, which looks like an error that no time step removes. Its result counts if
-                            the error vanishes, or if it is nearer to 0 at the finer step than it would be as dt → 0
+                            the error vanishes, or if it is nearer to 0 at the finer step than its estimate as dt → 0
             4. refined      an error that does not vanish with the time step alone, but together with the options that set the accuracy of
                             the engine, is attributed to these options
             5. calibrated   a model error is a setting error if the engine with calibrated settings has none or a smaller one

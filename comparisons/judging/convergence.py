@@ -181,7 +181,7 @@ def of_jump(found: Convergence, others: Sequence[tuple[Metric, Cause, Sequence[S
 def is_refuted(found: Convergence, finer: Convergence) -> bool:
     """Whether a finer time step shows that a model error is none.
 
-    The error vanishes; or it is undecided, and nearer to 0 than its estimate as dt → 0 was, by more than the error before differs from that.
+    The error vanishes; or it is undecided, and nearer to 0 than the estimate, by more than the error at the step before differs from that.
     """
     estimate = abs(found.budget.asymptotic_error)
     is_nearer = estimate - abs(finer.finest_error) > abs(estimate - abs(found.finest_error))

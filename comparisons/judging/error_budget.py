@@ -60,7 +60,7 @@ WIDEST_ORDER = 2.0
 """An order with a wider interval is not stated: the interval would contain three whole numbers."""
 
 SLOW = f"changes more slowly than dt^{ORDERS[0]:g}, too slowly to be extrapolated; much finer time steps are needed"
-EARLY = "falls faster at each finer time step, as an error that is as large as it can be does at coarse ones; finer time steps are needed"
+EARLY = "falls faster at each finer time step, as an error near its largest possible value does; finer time steps are needed"
 
 
 @dataclass(frozen=True)

@@ -216,7 +216,7 @@ class EngineStudy:
             2. coarser      if these leave the cause open, coarser steps are added. Their result counts if the cause was unresolved, or if
                             the model is the cause now
             3. finer        before a model error fails, a finer step is added, because a method can be unstable above some time step, or
-                            its error as large as it can be, which looks like an error that no time step removes. Its result counts if
+                            its error at its largest value, which looks like an error that no time step removes. Its result counts if
                             the error vanishes, or if it is nearer to 0 at the finer step than its estimate as dt → 0
             4. refined      an error that does not vanish with the time step alone, but together with the options that set the accuracy of
                             the engine, is attributed to these options

@@ -111,8 +111,8 @@ def is_clear_power(h: Array, e: Array) -> bool:
 def falls_ever_faster(h: Array, e: Array, small: Array) -> bool:
     """Whether errors, coarsest first, fall toward finer steps by more for each factor of the step: they have not begun to converge.
 
-    An error with a largest possible value does so while it leaves this value, and may still vanish. The powers of a series that converges do
-    the opposite. The last fall exceeds the noise and `NOTICEABLE` of the error, so that chance does not look like it.
+    An error with a largest possible value does so while it leaves this value, and may still vanish. The powers of a series that converges
+    do the opposite. The last fall exceeds the noise and `NOTICEABLE` of the error, so that chance does not look like it.
     """
     sizes = e * np.sign(e[-1])
     falls = np.diff(sizes) / np.diff(np.log(h))

@@ -206,7 +206,7 @@ def _worst(series: Sequence[SeriesPoint], judged: Callable[[Part], Judged], floo
     largest, others = _worst_parts(series)
     worst = judged(largest[0])
     for part in largest[1:]:
-        worst = _worse(worst, judged(part), floor)
+        worst = worst if worst[0].cause == "model" else _worse(worst, judged(part), floor)
     for part, size in others.items():
         if worst[0].cause != "model" and size > max(_reach(worst[0]), floor):
             other = judged(part)

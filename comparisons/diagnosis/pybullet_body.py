@@ -67,11 +67,7 @@ class PyBulletModel(UrdfFile):
     def __init__(self, path: Path, given: str) -> None:
         super().__init__(path, given)
         server().clear()
-        try:
-            load(given, str(path))
-        except DropspinError as error:
-            remedy = package_remedy(self.source) if "cannot find" in str(error) else ""
-            raise DropspinError(f"{str(error).removesuffix('.')}{remedy}.") from None
+        load(given, str(path), remedy=package_remedy(self.source))
 
     def body(self, name: str, on: str | None) -> LooseBody:
         """One of the bodies, above what it lands on."""

@@ -40,8 +40,14 @@ def server() -> Server:
     return Server()
 
 
-def load(given: str, file: str, flags: int = 0) -> int:
+def load(given: str, file: str, flags: int = 0, *, remedy: str = "") -> int:
     """Load a URDF file, or the text of one, and return the number of the body.
+
+    Args:
+        given: Its name for messages.
+        file: The path, or the text.
+        flags: Those of PyBullet.
+        remedy: What a message says after the reason if a file is not found.
 
     Raises:
         DropspinError: PyBullet does not load it, with what it printed.
@@ -63,7 +69,8 @@ def load(given: str, file: str, flags: int = 0) -> int:
     said_of = re.findall(r"b3(Error|Warning|Printf)\[[^]]*\]:(.*?)(?=b3(?:Error|Warning|Printf)\[|$)", text, re.DOTALL)
     pieces = [" ".join(piece.split()) for kind, piece in said_of if kind == "Error" or "cannot find" in piece]
     reason = "; ".join(pieces).replace(":;", ":")
-    raise DropspinError(f"{given}: PyBullet does not load it: {reason or 'it gives no reason'}.")
+    end = remedy if "cannot find" in reason else ""
+    raise DropspinError(f"{given}: PyBullet does not load it: {reason or 'it gives no reason'}{end}.")
 
 
 @contextmanager

@@ -138,7 +138,7 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
         order_tolerance = float(np.sum(np.abs(logs) * shares) / np.sum(logs**2))
     deciding = budget if vector is None or budget.cause != "discretisation" else vector
     is_open = deciding.cause == "unresolved" and has_value and float(np.nanmax(np.abs(errors))) > floor
-    finest = min(series, key=lambda point: point.dt)
+    finest = _finest(series)
     return Convergence(budget, finest.dt, order_tolerance, is_open, remark, finest.average.value if is_sufficient(list(dts)) else math.nan)
 
 
@@ -171,7 +171,7 @@ def of_jump(found: Convergence, others: Sequence[tuple[Metric, Cause, Sequence[S
     """
     causes = {cause for _, cause, _ in others}
     falling = [points for metric, cause, points in others if metric.unit == "1" and cause in ("discretisation", "unresolved")]
-    may_vanish = any(abs(min(points, key=lambda point: point.dt).average.value) > LARGE for points in falling)
+    may_vanish = any(abs(_finest(points).average.value) > LARGE for points in falling)
     if {"model", "setting"} & causes or not may_vanish:
         return found
     reason = "stays at its value at these time steps, from which it may jump: no other error is one of the model, and a large one falls"
@@ -205,12 +205,13 @@ def _worst(series: Sequence[SeriesPoint], judged: Callable[[Part], Judged], floo
     """The worst of the flights in which the error is largest at a time step, or one whose smaller error remains where theirs vanish."""
     largest, others = _worst_parts(series)
     worst = judged(largest[0])
-    for part in largest[1:]:
-        worst = worst if worst[0].cause == "model" else _worse(worst, judged(part), floor)
-    for part, size in others.items():
-        if worst[0].cause != "model" and size > max(_reach(worst[0]), floor):
-            other = judged(part)
-            worst = _worse(worst, other, floor) if other[0].cause == "model" else worst
+    for part in [*largest[1:], *others]:
+        if worst[0].cause == "model":
+            return worst
+        if part not in others:
+            worst = _worse(worst, judged(part), floor)
+        elif others[part] > max(_reach(worst[0]), floor) and (other := judged(part))[0].cause == "model":
+            worst = _worse(worst, other, floor)
     return worst
 
 
@@ -239,14 +240,18 @@ def _worst_parts(series: Sequence[SeriesPoint]) -> tuple[list[Part], dict[Part, 
     Flights that too few of the steps resolve count only if their error is far larger than that of the others.
     """
     resolved = sorted((point for point in series if np.isfinite(point.average.parts).all()), key=lambda point: point.dt)
-    finest = (resolved or sorted(series, key=lambda point: point.dt))[0].average.parts
+    finest = _finest(resolved or series).average.parts
     sizes, dts = np.abs(finest), [[point.dt for point in resolved if len(point.average.parts) > flight] for flight in range(len(finest))]
     of_enough = sizes[: sum(map(is_sufficient, dts))]
     if not of_enough.size or of_enough.max() < LARGE_SHARE * sizes.max():
         return _with_other_sign(_largest(sizes), finest), {}
-    alike = [np.abs(point.average.parts[: len(of_enough)]) for point in resolved if point.average.parts.ndim == finest.ndim]
-    largest = list(dict.fromkeys(part for sizes in [of_enough, *alike] for part in _with_other_sign(_largest(sizes), finest)))
+    at_each = [np.abs(point.average.parts[: len(of_enough)]) for point in resolved if point.average.parts.ndim == finest.ndim]
+    largest = list(dict.fromkeys(part for sizes_there in at_each for part in _with_other_sign(_largest(sizes_there), finest)))
     return largest, {part: float(of_enough[part]) for part in np.ndindex(of_enough.shape) if part not in largest}
+
+
+def _finest(series: Sequence[SeriesPoint]) -> SeriesPoint:
+    return min(series, key=lambda point: point.dt)
 
 
 def _largest(sizes: Array) -> Part:

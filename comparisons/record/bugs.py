@@ -238,8 +238,8 @@ def _outcome(bug: Bug, release: str, folder: Path, stopping: Event) -> Outcome:
         except DropspinError:
             return Outcome(release=release, state="not run", said=f"exit code {code}: {without_paths(last_line(printed))}")
     measured = (table["metric"] == bug.metric) & table["kind"].isin(("truth", "invariant"))
-    values = []
-    for of_scene in [table["scene"] != bug.right_in, *[table["scene"] == bug.right_in] * bool(bug.right_in)]:
+    is_control, values = table["scene"] == bug.right_in, []
+    for of_scene in (~is_control, is_control) if bug.right_in else (~is_control,):
         found = table[measured & of_scene]["value"].dropna()
         if found.empty:
             broken = table[of_scene & (table["reason"] != "")]["reason"]

@@ -217,7 +217,7 @@ class EngineStudy:
                             the model is the cause now
             3. finer        before a model error fails, a finer step is added, because a method can be unstable above some time step, or
                             its error at its largest value, which looks like an error that no time step removes. Its result counts if
-                            the error vanishes, or if it is nearer to 0 at the finer step than its estimate as dt → 0
+                            it refutes the model error: `is_refuted`
             4. refined      an error that does not vanish with the time step alone, but together with the options that set the accuracy of
                             the engine, is attributed to these options
             5. calibrated   a model error is a setting error if the engine with calibrated settings has none or a smaller one
@@ -240,9 +240,9 @@ class EngineStudy:
             longer = self._longer(metric, coarser)
             if longer is not None and (found.budget.cause == "unresolved" or longer.budget.cause == "model"):
                 found = longer
-        error = judge_asymptotic_error(scene, self.claim, metric, found)
-        if found.budget.cause == "model" and error is not None and error.verdict == "failed":
-            longer = self._longer(metric, [*coarser, min(dts) / 2.0])
+        if found.budget.cause == "model":
+            error = judge_asymptotic_error(scene, self.claim, metric, found)
+            longer = self._longer(metric, [*coarser, min(dts) / 2.0]) if error is not None and error.verdict == "failed" else None
             if longer is not None and is_refuted(found, longer):
                 found = longer
         if engine.accuracy and found.budget.cause in ("model", "unresolved") and not math.isnan(found.budget.asymptotic_error):

@@ -59,21 +59,20 @@ def _differences(again: Again) -> list[str]:
     differ = f"At {len(moved)} of {counted(len(again.cases), 'time step')}, the motion or the verdict differs from the record."
     sentences = [differ if moved else "Every verdict and motion equals that of the record, bit for bit."]
     of_all = counted(sum(len(was.values) for dt, (was, _) in again.cases.items() if dt not in moved), "value")
-    if recomputed:
-        differ = f"{len(recomputed)} of {of_all} of equal motions {'differs' if len(recomputed) == 1 else 'differ'} by more than rounding"
-        sentences.append(f"{differ}: dropspin computes these metrics otherwise than when the record was measured.")
-    if rounded := len(others) - len(recomputed):
-        sentences.append(f"{rounded} of {of_all} of equal motions {'differs' if rounded == 1 else 'differ'} by rounding alone.")
+    otherwise = "by more than rounding: dropspin computes these metrics otherwise than when the record was measured"
+    for count, how in ((len(recomputed), otherwise), (len(others) - len(recomputed), "by rounding alone")):
+        sentences += [f"{count} of {of_all} of equal motions {'differs' if count == 1 else 'differ'} {how}."] * bool(count)
     return sentences
 
 
 def as_data(again: Again) -> dict[str, Any]:
     """The results with all digits, for JSON."""
+    moved, recomputed = again.moved, again.recomputed
     cases = [
         {
             "dt": dt,
-            "same": dt not in again.moved,
-            "recomputed": [value.metric for value in again.recomputed if value.dt == dt],
+            "same": dt not in moved,
+            "recomputed": [value.metric for value in recomputed if value.dt == dt],
             "recorded": _case(was),
             "now": _case(now),
         }

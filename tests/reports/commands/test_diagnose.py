@@ -149,7 +149,7 @@ def test_engine_that_breaks_down_on_reading_a_file_is_named_beside_what_the_othe
     """What MuJoCo measures, or why it refuses the file; an empty mesh ends PyBullet's process."""
     bodies = pytest.importorskip("dropspin.comparisons.diagnosis.pybullet_body", exc_type=ImportError)
 
-    def break_down(*arguments):
+    def break_down(*arguments, **options):
         raise RuntimeError("no mesh")
 
     monkeypatch.setattr(bodies, "load", break_down)

@@ -1,17 +1,27 @@
 """Parameters that may differ from body to body. They are checked and packed into rows of numbers, which the kernels read."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from dropspin.reference_impl.body import Array, Body, Floor, KernelBody, KernelDamping, KernelWall, Wall, World
+from dropspin.reference_impl.checks import (
+    Quantity,
+    are_above_zero,
+    checked,
+    ensemble_size,
+    is_above_zero,
+    is_ellipsoid,
+    is_finite,
+    is_inertia,
+    is_not_negative,
+    is_unit,
+    numbers_of,
+)
 from dropspin.reference_impl.quaternion import from_matrix
 from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, compiled
-
-Test = Callable[[Array], NDArray[np.bool_]]
 
 # The first column of each quantity: `pack` writes them in the order of `_quantities`, then what follows from them, then the walls.
 STEP_SIZE, GRAVITY, DAMPING, FLOOR, EDGES, MASS, INERTIA, SEMI_AXES = 0, 1, 4, 6, 9, 12, 13, 22
@@ -56,32 +66,32 @@ def pack(body: Body, world: World, dt: float | Array) -> Parameters:
     return Parameters(np.ascontiguousarray(columns), points, is_ensemble)
 
 
-def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[ArrayLike, tuple[int, ...], str, Test]]:
+def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, Quantity]:
     """Each argument with the shape for one body, the allowed values in words, and a test for them."""
     floor = world.floor or Floor(0.0, 0.0)
     gravity = np.zeros(3) if world.gravity is None else world.gravity
     if world.damping is not None and len(world.damping) != 2:
         raise ValueError(f"damping: got {world.damping!r}; must be two rates, of velocity and of angular velocity, in 1/s")
     linear, angular = world.damping or (0.0, 0.0)
-    walls: dict[str, tuple[ArrayLike, tuple[int, ...], str, Test]] = {}
+    walls: dict[str, Quantity] = {}
     for name, wall in _walls(world).items():
         walls |= _surface(name, wall.surface)
         walls[f"{name}point"] = (wall.point, (3,), "finite numbers, in m", is_finite)
-        walls[f"{name}normal"] = (wall.normal, (3,), "a vector of length 1", _is_unit)
-    points = _numbers("points", body.points, "finite numbers, in m")
+        walls[f"{name}normal"] = (wall.normal, (3,), "a vector of length 1", is_unit)
+    points = numbers_of("points", body.points, "finite numbers, in m")
     vertices = max((1, *points.shape[-2:-1]))
     return {
-        "dt": (dt, (), "a number above 0, in s", _is_above_zero),
+        "dt": (dt, (), "a number above 0, in s", is_above_zero),
         "gravity": (gravity, (3,), "finite numbers, in m/s²", is_finite),
-        "linear damping": (linear, (), "0 or more, in 1/s", _is_not_negative),
-        "angular damping": (angular, (), "0 or more, in 1/s", _is_not_negative),
+        "linear damping": (linear, (), "0 or more, in 1/s", is_not_negative),
+        "angular damping": (angular, (), "0 or more, in 1/s", is_not_negative),
         **_surface("", floor),
-        "half_extents": ((np.inf, np.inf) if floor.half_extents is None else floor.half_extents, (2,), "above 0, in m", _are_above_zero),
+        "half_extents": ((np.inf, np.inf) if floor.half_extents is None else floor.half_extents, (2,), "above 0, in m", are_above_zero),
         "thickness": (np.inf if floor.thickness is None else floor.thickness, (), "above 0, in m", lambda depth: depth > 0.0),
-        "mass": (body.mass, (), "a number above 0, in kg", _is_above_zero),
-        "inertia": (body.inertia, (3, 3), "a symmetric, positive definite 3 x 3 matrix, in kg m²", _is_inertia),
+        "mass": (body.mass, (), "a number above 0, in kg", is_above_zero),
+        "inertia": (body.inertia, (3, 3), "a symmetric, positive definite 3 x 3 matrix, in kg m²", is_inertia),
         "points": (points, (vertices, 3), "finite numbers, in m, for at least one vertex", is_finite),
-        "semi_axes": (body.semi_axes, (3,), "0 or more, in m, of a disc 0 along y", _is_ellipsoid),
+        "semi_axes": (body.semi_axes, (3,), "0 or more, in m, of a disc 0 along y", is_ellipsoid),
         **walls,
     }
 
@@ -91,11 +101,11 @@ def _walls(world: World) -> dict[str, Wall]:
     return {f"{WALL}[{number}].": wall for number, wall in enumerate(world.walls)}
 
 
-def _surface(name: str, surface: Floor) -> dict[str, tuple[ArrayLike, tuple[int, ...], str, Test]]:
+def _surface(name: str, surface: Floor) -> dict[str, Quantity]:
     return {
         f"{name}restitution": (surface.restitution, (), "between 0 and 1", lambda e: (e >= 0.0) & (e <= 1.0)),
         f"{name}friction": (surface.friction, (), "0 or more", lambda f: f >= 0.0),
-        f"{name}rest_speed": (surface.rest_speed, (), "0 or more, in m/s", _is_not_negative),
+        f"{name}rest_speed": (surface.rest_speed, (), "0 or more, in m/s", is_not_negative),
     }
 
 
@@ -103,88 +113,6 @@ def frictions(world: World) -> Iterator[Array]:
     """The coefficients of friction of the floor and of the walls."""
     surfaces = [*([world.floor] if world.floor else []), *(wall.surface for wall in world.walls)]
     return (np.asarray(surface.friction, dtype=float) for surface in surfaces)
-
-
-def is_finite(values: Array) -> NDArray[np.bool_]:
-    """Whether all numbers of a body are finite, for each body."""
-    return np.logical_and.reduce(np.isfinite(values).reshape(len(values), -1), axis=1)
-
-
-def _is_above_zero(values: Array) -> NDArray[np.bool_]:
-    return is_finite(values) & (values > 0.0)
-
-
-def _are_above_zero(values: Array) -> NDArray[np.bool_]:
-    return np.all(values > 0.0, axis=1)
-
-
-def _is_unit(vectors: Array) -> NDArray[np.bool_]:
-    return np.abs(np.sum(vectors * vectors, axis=1) - 1.0) < 1e-12
-
-
-def _is_not_negative(values: Array) -> NDArray[np.bool_]:
-    return is_finite(values) & (values >= 0.0)
-
-
-def _is_ellipsoid(values: Array) -> NDArray[np.bool_]:
-    """Whether semi-axes are those of a point, a disc across y, or an ellipsoid."""
-    across, is_point = np.all(values[:, [0, 2]] > 0.0, axis=1), ~np.any(values, axis=1)
-    return is_finite(values) & np.all(values >= 0.0, axis=1) & (across | is_point)
-
-
-MIN_MOMENT_RATIO = 1e-13
-"""Smallest ratio of two moments of inertia; a smaller one is 0 up to rounding, as for collinear points."""
-MIN_LARGEST_MOMENT = 1e-290  # kg m²; so that the inverse is finite too
-MAX_ASYMMETRY = 1e-12  # of the largest entry
-
-
-def _is_inertia(matrices: Array) -> NDArray[np.bool_]:
-    usable = np.where(is_finite(matrices)[:, np.newaxis, np.newaxis], matrices, -np.eye(3))
-    lowest = np.linalg.eigvalsh(usable)[:, 0]
-    asymmetry = np.abs(usable - usable.transpose(0, 2, 1)).max(axis=(1, 2))
-    highest = np.abs(usable).max(axis=(1, 2))
-    return (lowest > MIN_MOMENT_RATIO * highest) & (highest > MIN_LARGEST_MOMENT) & (asymmetry <= MAX_ASYMMETRY * highest)
-
-
-def checked(name: str, values: ArrayLike, shape: tuple[int, ...], allowed: str, holds: Test) -> Array:
-    """An argument for one body (of that shape) or for each (one more axis, first) as an array with that axis, shape (1 or B, …).
-
-    Raises:
-        ValueError: The shape or a value is not allowed; in an ensemble the text names the body.
-    """
-    numbers = _numbers(name, values, allowed)
-    array = numbers[np.newaxis] if numbers.ndim == len(shape) else numbers
-    if array.shape[1:] != shape or len(array) == 0:
-        raise ValueError(f"{name}: must have shape {shape} or {('B', *shape)}, got {numbers.shape}".replace("'", ""))
-    wrong = np.flatnonzero(~holds(array))
-    if len(wrong):
-        whose = f" for body {wrong[0]}" if numbers.ndim > len(shape) else ""
-        raise ValueError(f"{name}: got {array[wrong[0]].tolist()}{whose}; must be {allowed}")
-    return array
-
-
-def _numbers(name: str, values: ArrayLike, allowed: str) -> Array:
-    """A copy of the argument, so that later changes to the caller's array have no effect."""
-    try:
-        array = np.asarray(values)
-    except ValueError:  # rows of different length
-        array = np.asarray(None)
-    if array.dtype.kind not in "iuf":
-        raise ValueError(f"{name}: got {values!r}; must be {allowed}")
-    return np.array(array, dtype=float, order="C")
-
-
-def ensemble_size(quantities: Mapping[str, Array]) -> int:
-    """The number of bodies B of arguments of shape (1, …) or (B, …).
-
-    Raises:
-        ValueError: Two arguments have different B. The text names both.
-    """
-    sizes = {len(values): name for name, values in quantities.items() if len(values) > 1}
-    if len(sizes) > 1:
-        listed = " but ".join(f"{size} of {name}" for size, name in sizes.items())
-        raise ValueError(f"ensemble: got {listed}; all arguments that differ from body to body must be for the same number of bodies")
-    return next(iter(sizes), 1)
 
 
 def _decay(rates: Array, step_sizes: Array) -> Array:

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dropspin.reference_impl.body import Array, Body, World
+from dropspin.reference_impl.checks import checked, ensemble_size, is_finite
 from dropspin.reference_impl.floor_plane import BLOCK
 from dropspin.reference_impl.kernels import Parts, recording_kernel
 from dropspin.reference_impl.methods import Methods
-from dropspin.reference_impl.parameters import SEMI_AXES, checked, ensemble_size, frictions, is_finite, pack
+from dropspin.reference_impl.parameters import SEMI_AXES, frictions, pack
 from dropspin.reference_impl.state import ORIENTATION, SPIN
 from dropspin.reference_impl.threads import share_out
 

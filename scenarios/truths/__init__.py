@@ -69,11 +69,19 @@ def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
         return flight(scene) if law is None else None
     if scene.damping is not None:
         return None
-    if scene.has_edges_or_walls:
-        return _among_planes(scene, floor, law)
-    if law is not None:
-        return corner_impact(scene, floor, law)
-    return next(filter(None, (problem(scene, floor) for problem in ON_FLOOR)), None)
+    if law is None and not scene.has_edges_or_walls:
+        return next(filter(None, (problem(scene, floor) for problem in ON_FLOOR)), None)
+    if scene.has_edges_or_walls and scene.clearance < -TOUCHING * scene.body.size:
+        return None  # it starts beside or below the floor
+    struck = corner_impact(scene, floor, law)
+    if not scene.has_edges_or_walls:
+        return struck
+    # Of the solution for impacts and those for an endless floor, the one that is valid longest.
+    truths = [struck and until_near(scene, struck, walls=False)]
+    if law is None:
+        others = (problem(scene, floor) for problem in ON_FLOOR if problem is not corner_impact)
+        truths += [until_near(scene, other) for other in others if other is not None]
+    return max(filter(None, truths), key=lambda truth: truth.horizon, default=None)
 
 
 def exact_solution(scene: Scenario) -> Truth:
@@ -90,18 +98,6 @@ def reference_for(scene: Scenario) -> Truth | None:
         As `truth_for`; `is_exact` is False for a toss.
     """
     return truth_for(scene) if scene.recording is None else measured(scene.recording, scene.recording.tosses[0])
-
-
-def _among_planes(scene: Scenario, floor: Floor, law: Law | None) -> Truth | None:
-    """The solution that is valid longest with walls or a floor that ends: that of impacts, or one for an endless floor while valid."""
-    if scene.clearance < -TOUCHING * scene.body.size:
-        return None  # it starts beside or below the floor
-    struck = corner_impact(scene, floor, law)
-    truths = [struck and until_near(scene, struck, walls=False)]
-    if law is None:
-        others = (problem(scene, floor) for problem in ON_FLOOR if problem is not corner_impact)
-        truths += [until_near(scene, other) for other in others if other is not None]
-    return max(filter(None, truths), key=lambda truth: truth.horizon, default=None)
 
 
 def other_laws(scene: Scenario) -> dict[Law, Truth]:

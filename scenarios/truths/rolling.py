@@ -128,9 +128,9 @@ def _orientations(scene: Scenario, spins: Motion, kink: float) -> Callable[[Arra
     largest = samples[np.argmax(np.linalg.norm(samples, axis=1))]
     size = float(np.linalg.norm(largest))
     axis = largest / size if size else UP
-    if np.linalg.norm(np.cross(axis, samples), axis=1).max() <= ONE_AXIS * size:
-        return lambda t: multiply(about(axis, spins(t)[1] @ axis), start[ORIENTATION])
-    return _integrated(start[ORIENTATION], spins, min(kink, scene.duration), scene.duration)
+    if np.linalg.norm(np.cross(axis, samples), axis=1).max() > ONE_AXIS * size:
+        return _integrated(start[ORIENTATION], spins, min(kink, scene.duration), scene.duration)
+    return lambda t: multiply(about(axis, spins(t)[1] @ axis), start[ORIENTATION])
 
 
 def _integrated(start: Array, spins: Motion, kink: float, end: float) -> Callable[[Array], Array]:

@@ -1,5 +1,6 @@
 """The closed form of the free rotor compared with Taylor series of 40 digits, with invariants, and with simpler exact solutions."""
 
+from fractions import Fraction
 from functools import cache
 
 import mpmath
@@ -11,7 +12,8 @@ from hypothesis.extra.numpy import arrays
 from support import taylor
 
 from dropspin.scenarios.rotations import angle_between_orientations, multiply, rotate, unrotate
-from dropspin.scenarios.truths.free_rotor import AsymmetricTop, free_rotor, principal_spin
+from dropspin.scenarios.truths.asymmetric_top import AsymmetricTop
+from dropspin.scenarios.truths.free_rotor import free_rotor, principal_spin
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 TILTED = np.array([0.5, 0.5, 0.5, 0.5])  # a unit quaternion that doubles hold exactly, and that only permutes axes
@@ -76,9 +78,13 @@ def test_taylor_series_are_converged():
 
 def test_periods_match_published_values():
     """The brick's spin repeats after 15.22777 s, the wing nut turns over every 6.861337 s (independent results by mpmath)."""
-    brick = AsymmetricTop(np.array([0.00189422, 0.00621102, 0.00719467]), np.eye(3), IDENTITY, np.radians([25, -15, 40]))
+
+    def top(moments, spin):
+        return AsymmetricTop(np.array(moments), np.eye(3), IDENTITY, np.array([Fraction(rate) for rate in spin]))
+
+    brick = top([0.00189422, 0.00621102, 0.00719467], np.radians([25, -15, 40]).tolist())
     assert brick.period == pytest.approx(15.22777, abs=5e-6)
-    nut = AsymmetricTop(np.array([1.0, 2.0, 3.0]), np.eye(3), IDENTITY, np.array([0.001, 5.0, 0.0]))
+    nut = top([1.0, 2.0, 3.0], [0.001, 5.0, 0.0])
     assert nut.period / 2 == pytest.approx(6.861337, abs=5e-7)
 
 

@@ -31,7 +31,7 @@ SWEEP = {
 }
 
 STAGES = {
-    "timing of steps": [("run", "_timings")],
+    "timing of steps": [("run", "time_engines")],
     "exact motions": [(module, "phases_at") for module in ("scene_run", "engine_study")],
     "metrics": [("engine_study", "compare"), ("engine_study", "measure"), ("scene_run", "compare")],
     "judging over time steps": [("engine_study", "convergence")],

@@ -69,7 +69,7 @@ def _timed_briefly():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("dropspin.comparisons.running.timing.TIMING_REPEATS", 1)
-        patch.setattr("dropspin.comparisons.running.run.time_engine", time_briefly)
+        patch.setattr("dropspin.comparisons.running.timing.time_engine", time_briefly)
         patch.setattr("dropspin.comparisons.tradeoff.costs.BATCH_SECONDS", 1e-4)
         patch.setattr("dropspin.comparisons.tradeoff.costs.LONG_ENOUGH", 2e-4)
         yield

@@ -100,7 +100,8 @@ def engine(name: str) -> Engine:
         EngineBroken: The engine cannot be imported or constructed.
         DropspinError: The class is not an engine.
     """
-    return constructed(*parsed(name))
+    base, options = parsed(name)
+    return constructed(base, options)
 
 
 def parsed(name: str) -> tuple[str, dict[str, str]]:
@@ -131,24 +132,24 @@ def is_foreign(base: str) -> bool:
 
 def _adapter(base: str) -> type[Engine]:
     """The class of an engine's name."""
-    if base in BUILT_IN:
-        home = BUILT_IN[base]
-        # Checked before the import of the adapter, which imports its engine.
-        if absent := absence(base):
-            raise EngineMissing(f"{base} is not installed: {absent}{'' if absent == NO_NODE else home.note}.")
-        try:
-            return getattr(import_module(home.module), home.adapter)
-        except (Exception, SystemExit) as error:
-            text = described(error)
-            cure = next((f"; {cure}" for pattern, cure in CURES.items() if re.search(pattern, text)), "")
-            raise EngineBroken(f"{base} is installed, but {home.package} cannot be imported: {text}{cure}.") from error
     if ":" in base:
         module, _, attribute = base.partition(":")
         return _imported(base, module, attribute)
-    brought = _entry_points()
-    if base not in brought:
-        raise DropspinError(f"{UnknownName('engine', base, engine_names())} Name an engine of your own as my_module:MyEngine.")
-    return _imported(base, brought[base].module, brought[base].attr)
+    if base not in BUILT_IN:
+        brought = _entry_points()
+        if base not in brought:
+            raise DropspinError(f"{UnknownName('engine', base, engine_names())} Name an engine of your own as my_module:MyEngine.")
+        return _imported(base, brought[base].module, brought[base].attr)
+    home = BUILT_IN[base]
+    # Checked before the import of the adapter, which imports its engine.
+    if absent := absence(base):
+        raise EngineMissing(f"{base} is not installed: {absent}{'' if absent == NO_NODE else home.note}.")
+    try:
+        return getattr(import_module(home.module), home.adapter)
+    except (Exception, SystemExit) as error:
+        text = described(error)
+        cure = next((f"; {cure}" for pattern, cure in CURES.items() if re.search(pattern, text)), "")
+        raise EngineBroken(f"{base} is installed, but {home.package} cannot be imported: {text}{cure}.") from error
 
 
 def absence(base: str) -> str:

@@ -1,6 +1,6 @@
 """A run: scenes × engines × time steps, measured against exact solutions and against each other, and judged."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from itertools import product
 from threading import Lock
@@ -8,7 +8,7 @@ from typing import Any
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.stand_in import code_of
-from dropspin.comparisons.judging.judge import verify_expectations
+from dropspin.comparisons.judging.expectations import verify_expectations
 from dropspin.comparisons.measuring.batch import compile_states
 from dropspin.comparisons.measuring.metrics import values_of
 from dropspin.comparisons.results.provenance import provenance
@@ -20,11 +20,10 @@ from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene
 from dropspin.comparisons.running.parallel import started_crews, work_in_parallel
 from dropspin.comparisons.running.processes import FIVE_MINUTES, EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.progress import OnProgress, Progress
-from dropspin.comparisons.running.recording import Breakdown
-from dropspin.comparisons.running.scene_run import Timings, run_scene
+from dropspin.comparisons.running.scene_run import run_scene
 from dropspin.comparisons.running.start_phases import StartPhase
-from dropspin.comparisons.running.timing import Timing, time_engine
-from dropspin.scenarios import DropspinError, Scenario, Trajectory, reference_for, truth_for
+from dropspin.comparisons.running.timing import time_engines
+from dropspin.scenarios import DropspinError, Trajectory, reference_for, truth_for
 
 DEFAULT_DTS = (4e-3, 2e-3, 1e-3)
 
@@ -89,7 +88,7 @@ def run(
     for own in pending[:1]:
         compile_states(own.scene)
     with started_crews(jobs, len(pending), entries, resources) as crews:
-        timings = _timings([own.scene for own in pending], entries, dts, crews[0], report)
+        timings = time_engines([own.scene for own in pending], entries, dts, crews[0], report)
         expected = forecast(pending, entries, dts, timings, len(crews))
         if on_forecast is not None:
             on_forecast(expected)
@@ -127,12 +126,12 @@ def _request(
     for name, given in (("scenes", chosen), ("engines", entries), ("dt", dts)):
         if not given:
             raise DropspinError(f"{name}: got none; give at least one.")
+    for scene, step in product(chosen, dts):
+        verify_time_step(scene, step, len(entries))
     labels = [entry.label for entry in entries]
     requested = [StartPhase(scene, reference_for(scene), quick) for scene in chosen]
     for scene, truth, *_ in requested:
         verify_expectations(scene, truth, labels)
-        for step in dts:
-            verify_time_step(scene, step, len(entries))
     if len(set(dts)) < len(dts):
         raise DropspinError(f"dt: a time step is given twice ({', '.join(f'{step:g}' for step in dts)}); give each once.")
     if len(set(labels)) < len(labels):
@@ -142,18 +141,6 @@ def _request(
     adapters = {entry.label: code_of(entry.engine) for entry in entries if entry.engine is not None}
     by_name = {entry.label: name.strip() for entry, name in zip(entries, asked, strict=True) if isinstance(name, str)}
     return requested, entries, dts, provenance(asked_for) | {"names": by_name, "adapters": adapters}
-
-
-def _timings(
-    scenes: Sequence[Scenario], entries: Sequence[EngineEntry], dts: Sequence[float], processes: EngineProcesses, on_progress: OnProgress
-) -> Timings:
-    """The time that the steps of each engine take, measured while nothing else runs."""
-    found = {}
-    for scene, entry, dt in product(scenes, entries, dts):
-        on_progress(Progress(scene.name, entry.label, dt, timing=True))
-        timing = processes.call(entry, time_engine, scene, dt)
-        found[scene.name, entry.label, dt] = Timing(breakdown=timing, ended=True) if isinstance(timing, Breakdown) else timing
-    return found
 
 
 def what_changed(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> str:

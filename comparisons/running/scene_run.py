@@ -22,12 +22,10 @@ from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress
 from dropspin.comparisons.running.start_phases import StartPhase, compare, phases_at, with_exact_motions
-from dropspin.comparisons.running.timing import Timing
+from dropspin.comparisons.running.timing import Timings
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.truths import other_laws
 
-Timings = Mapping[tuple[str, str, float], Timing]
-"""By scene, engine and time step."""
 Compared = tuple[Outcome, Sequence[Comparison]]
 """What an engine gave at a time step, and its motions from all start phases compared with the exact ones."""
 

@@ -5,8 +5,8 @@ An engine may return from `advance` before its steps are done, and wait for them
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Engine, numpy_array
 from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
+from dropspin.comparisons.running.processes import EngineProcesses
+from dropspin.comparisons.running.progress import OnProgress, Progress
 from dropspin.comparisons.running.recording import Breakdown, classify, verify_accepted
 from dropspin.scenarios import Scenario
 
@@ -123,6 +125,10 @@ class Timing(NamedTuple):
     in_batches: bool = False
 
 
+Timings = Mapping[tuple[str, str, float], Timing]
+"""By scene, engine and time step."""
+
+
 def time_engine(entry: EngineEntry, scene: Scenario, dt: float) -> Timing:
     """Time whole simulations of a scene, native steps only, with compilation timed separately; a failure is part of the result."""
     engine, steps = entry.adapter, scene.steps(dt)
@@ -134,3 +140,15 @@ def time_engine(entry: EngineEntry, scene: Scenario, dt: float) -> Timing:
         return Timing(breakdown=classify(error))
     compilation = 0.0 if first is None else max(first.whole - min(run.whole for run in runs), 0.0)
     return Timing(time_per_step(runs), compilation, in_batches=engine.steps_batches)
+
+
+def time_engines(
+    scenes: Sequence[Scenario], entries: Sequence[EngineEntry], dts: Sequence[float], processes: EngineProcesses, on_progress: OnProgress
+) -> Timings:
+    """The time that the steps of each engine take, measured while nothing else runs."""
+    found = {}
+    for scene, entry, dt in product(scenes, entries, dts):
+        on_progress(Progress(scene.name, entry.label, dt, timing=True))
+        timing = processes.call(entry, time_engine, scene, dt)
+        found[scene.name, entry.label, dt] = Timing(breakdown=timing, ended=True) if isinstance(timing, Breakdown) else timing
+    return found

@@ -7,7 +7,7 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import EngineBroken
 from dropspin.comparisons.engines.options import spelled
-from dropspin.comparisons.judging.judge import verify_expectations
+from dropspin.comparisons.judging.expectations import verify_expectations
 from dropspin.reports.document import Rows
 from dropspin.reports.stories.numbers import bound
 from dropspin.reports.stories.scene import left_out, modelled

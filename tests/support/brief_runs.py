@@ -42,6 +42,9 @@ def few_starts() -> Iterator[None]:
         yield
 
 
+time_wholly = timing.time_engine
+
+
 def time_briefly(entry: EngineEntry, scene: Scenario, dt: float) -> timing.Timing:
     """As `time_engine`, by the first steps of a scene."""
     whole = timing.time_steps
@@ -50,11 +53,11 @@ def time_briefly(entry: EngineEntry, scene: Scenario, dt: float) -> timing.Timin
         return whole(engine, scene, dt, min(steps, TIMED_STEPS))
 
     with mock.patch.object(timing, "time_steps", first_steps):
-        return timing.time_engine(entry, scene, dt)
+        return time_wholly(entry, scene, dt)
 
 
 @contextmanager
 def whole_timings() -> Iterator[None]:
     """Time all steps of a scene, beside which the call is short."""
-    with mock.patch("dropspin.comparisons.running.run.time_engine", timing.time_engine):
+    with mock.patch.object(timing, "time_engine", time_wholly):
         yield

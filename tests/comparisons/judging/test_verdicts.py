@@ -9,7 +9,8 @@ from dropspin import scenarios
 from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.judging.convergence import Claim, Convergence, SeriesPoint
 from dropspin.comparisons.judging.error_budget import ErrorBudget
-from dropspin.comparisons.judging.judge import compared_with_expectations, judge, judge_asymptotic_error, verify_expectations
+from dropspin.comparisons.judging.expectations import compared_with_expectations, verify_expectations
+from dropspin.comparisons.judging.judge import judge, judge_asymptotic_error
 from dropspin.comparisons.judging.verdicts import with_reason
 from dropspin.comparisons.measuring.metric import Average
 from dropspin.comparisons.measuring.metrics import METRICS

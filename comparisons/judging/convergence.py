@@ -44,6 +44,8 @@ LARGE = 0.01
 """A ratio, such as an error of restitution, that may let a body leave the flights of the exact solution."""
 DESYNCHRONISED = 0.5
 """Position error, relative to the drop height, at which a bouncing body is in another flight, so that its position error has no meaning."""
+SIDEWAYS = 0.9
+"""Share of a position error from which, if it is horizontal, the error is that of a body beside its place, not in another flight."""
 
 Part = tuple[int, ...]
 """A flight, and of a metric with two signs the largest or the smallest value in it."""
@@ -271,8 +273,15 @@ def _errors_of(scene: Scenario, metric: Metric, series: Sequence[SeriesPoint], p
     if metric.unit == "rad":
         errors[np.abs(errors) > SATURATION] = math.nan
     if metric.name == "position_error" and scene.starts_above_floor and scene.recording is None:
-        errors[np.abs(errors) > DESYNCHRONISED * scene.clearance] = math.nan
+        is_sideways = [_sideways(point, part[0]) >= SIDEWAYS * abs(error) for point, error in zip(series, errors, strict=True)]
+        errors[(np.abs(errors) > DESYNCHRONISED * scene.clearance) & ~np.array(is_sideways)] = math.nan
     return errors, resolutions
+
+
+def _sideways(point: SeriesPoint, flight: int) -> float:
+    """The horizontal length of the mean position error at the end of the middle half of a flight [m]; 0 if it is not known."""
+    components = None if point.components is None else point.components.parts
+    return 0.0 if components is None or flight >= len(components) else float(np.hypot(components[flight, 0], components[flight, 2]))
 
 
 def _budget_of_components(

@@ -71,3 +71,20 @@ def test_trend_of_an_error_that_rises_and_vanishes_is_undecided(errors, undecide
     rows.append(("asymptotic_error", np.nan, 0.1, 0.0, 50.0, "unresolved"))
     table = pd.DataFrame(rows, columns=["kind", "dt", "value", "lower", "upper", "cause"]).assign(scene="a", engine="b", metric="c")
     assert is_undecided(table).tolist() == [False] * len(steps) + [undecided]
+
+
+class Beside(made.Exact):
+    """The body is 2 m beside its place at every time step."""
+
+    name = "beside"
+
+    def prepare(self, scene, dt):
+        return made.ExactSimulation(scene, dt, lambda row, _: row + 2.0 * np.eye(13)[0])
+
+
+def test_body_beside_its_place_is_not_in_another_flight():
+    """An error of more than half the drop height is one of the model where the height is right."""
+    scene = ds.load("drop-box-corner").model_copy(update={"expect": ()})
+    found = ds.run(scene, Beside()).asymptotic_errors("model").set_index("metric")
+    assert found.loc["position_error", "verdict"] == "failed"
+    assert found.loc["position_error", "value"] == pytest.approx(2.0, rel=1e-9)

@@ -1,5 +1,6 @@
 """The time up to which a body stays away from walls and from the end of the floor, so that a solution without them holds."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +17,8 @@ FASTER = 2.0
 def until_near(scene: Scenario, truth: Truth, *, walls: bool = True) -> Truth | None:
     """A solution up to the time at which the body may touch a wall, or may reach the end of the floor; None if it may do so at the start.
 
-    Between two samples the body moves by at most the largest speed times the interval: it is away from a plane if the sphere about it that
-    contains it is further away than that.
+    Between two samples the body moves along the normal of a plane by at most the largest speed along it times the interval: it is away from
+    the plane if the sphere about it that contains it is further away than that.
 
     Args:
         scene: The scene.
@@ -28,8 +29,11 @@ def until_near(scene: Scenario, truth: Truth, *, walls: bool = True) -> Truth | 
     times = np.linspace(0.0, end, SAMPLES)
     states = truth.states(times)
     interval = times[1]
-    fastest = float(np.linalg.norm(states[:, VELOCITY], axis=1).max()) * FASTER + float(np.linalg.norm(scene.acceleration)) * interval
-    away = _room(scene, states, walls) > fastest * interval
+    struck = [state[VELOCITY] for event in truth.events for state in (event.before, event.after)]
+    velocities, away = np.vstack([states[:, VELOCITY], *struck]), np.full(SAMPLES, True)
+    for point, normal in _planes(scene, walls):
+        fastest = FASTER * float(np.abs(velocities @ normal).max()) + abs(float(scene.acceleration @ normal)) * interval
+        away &= (states[:, POSITION] - point) @ normal - scene.body.size > fastest * interval
     if away.all():
         return truth
     horizon = float(times[max(int(np.argmin(away)) - 1, 0)])
@@ -39,12 +43,10 @@ def until_near(scene: Scenario, truth: Truth, *, walls: bool = True) -> Truth | 
     return replace(truth, events=events, horizon=horizon, ends="the body comes near a wall or the end of the floor")
 
 
-def _room(scene: Scenario, states: Array, walls: bool) -> Array:
-    """Distance of the sphere about the centre of mass that contains the body from the planes that the body must not touch [m]."""
+def _planes(scene: Scenario, walls: bool) -> Iterator[tuple[Array, Array]]:
+    """A point and the normal of each plane that the body must not touch; above the end of the floor these are vertical."""
     assert scene.floor is not None
-    position, room = states[:, POSITION], np.full(len(states), np.inf)
     for wall in (scene.wall or ()) if walls else ():
-        room = np.minimum(room, (position - wall.point) @ wall.normal)
-    if scene.floor.half_extents is not None:
-        room = np.minimum(room, (np.array(scene.floor.half_extents) - np.abs(position[:, [0, 2]])).min(axis=1))
-    return room - scene.body.size
+        yield np.array(wall.point), np.array(wall.normal)
+    for extent, axis in zip(scene.floor.half_extents or (), np.eye(3)[[0, 2]], strict=False):
+        yield from ((extent * outward, -outward) for outward in (axis, -axis))

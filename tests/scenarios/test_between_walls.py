@@ -152,7 +152,7 @@ def test_corner_that_strikes_a_wall_has_the_impact_of_a_floor_there(shape):
 
 def test_solutions_of_the_floor_hold_until_the_body_comes_near_a_wall_or_the_end():
     """A ball that rolls towards a wall, one that rolls towards the end of the floor, and one that rolls along the wall."""
-    rolls = {"position": [0.0, RADIUS, 0.0], "velocity": [1.0, 0.0, 0.0], "angular_velocity": [0.0, 0.0, -1.0 / RADIUS]}
+    rolls = {"position": [3e-4, RADIUS, 0.0], "velocity": [1.0, 0.0, 0.0], "angular_velocity": [0.0, 0.0, -1.0 / RADIUS]}
     rough = FLOOR | {"friction": 0.5}
     to_wall = truth_for(scene([RIGHT], rough, gravity=[0.0, -9.8, 0.0], **rolls))
     assert 0.78 < to_wall.horizon < 0.8
@@ -162,6 +162,17 @@ def test_solutions_of_the_floor_hold_until_the_body_comes_near_a_wall_or_the_end
     along = truth_for(scene([RIGHT | {"normal": [0.0, 0.0, 1.0], "point": [0.0, 0.0, -0.2]}], rough, gravity=[0.0, -9.8, 0.0], **rolls))
     assert along.covers_all(2.0)
     assert to_wall.name == to_end.name == along.name
+
+
+@pytest.mark.parametrize(("height", "duration"), [(3.0, 40.0), (3.0, 400.0), (1000.0, 20.0)])
+def test_fast_or_long_vertical_motion_comes_no_nearer_to_the_end_of_the_floor(height, duration):
+    """A small cube falls onto the middle of a table and rests there."""
+    cube = {"shape": "box", "half_extents": [0.02, 0.02, 0.02], "mass": 0.1}
+    table = {"restitution": 0.0, "friction": 1.0, "half_extents": [0.2, 0.2], "thickness": 0.05}
+    start, gravity = {"position": [0.0, height, 0.0]}, {"acceleration": [0.0, -9.8, 0.0]}
+    truth = truth_for(load({"duration": duration, "body": cube, "start": start, "gravity": gravity, "floor": table}))
+    assert truth.covers_all(duration)
+    np.testing.assert_allclose(truth.states(np.array([duration]))[0, :3], [0.0, 0.02, 0.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("position", [[3.0, 0.3, 0.0], [0.0, -1.0, 0.0]])

@@ -16,6 +16,7 @@ from dropspin.scenarios.mechanics import depth_of, lowest_height, offset_of
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.rotations import length
 from dropspin.scenarios.state import Array
+from dropspin.scenarios.surfaces import Floor
 
 FailureMode = Literal["declined", "sound", "inaccurate", "gains_energy", "sinks", "tunnels", "clamped", "diverged", "crashed", "timed_out"]
 FAILURE_MODES: tuple[FailureMode, ...] = get_args(FailureMode)
@@ -79,8 +80,10 @@ def diagnose(motion: ExtendedMotion, within: float) -> Diagnosis:
         exact = None if whole.reference is None else whole.reference[: len(motion.nominal)]
         case = Comparison.with_truth(motion.scene, motion.nominal, motion.truth, exact)
         diagnoses = [*_energy_gain(whole), *_errors(motion, case, within), *_position_off(case)]
-        if motion.scene.floor is not None and not motion.scene.floor.ends:
-            diagnoses += [*_tunnels(motion), *_sinks(motion), *_never_rests(motion, whole)]
+        if motion.scene.floor is not None:
+            diagnoses += _tunnels(motion, motion.scene.floor)
+            if not motion.scene.floor.ends:
+                diagnoses += [*_sinks(motion), *_never_rests(motion, whole)]
     return worst(diagnoses)
 
 
@@ -102,13 +105,15 @@ def _may_gain(scene: Scenario) -> bool:
     return not scene.body.is_ball and any(surface.friction != "none" and surface.restitution > 0.0 for surface in scene.surfaces)
 
 
-def _tunnels(motion: ExtendedMotion) -> Iterator[Diagnosis]:
-    """The whole body below the floor, at the end or in between."""
+def _tunnels(motion: ExtendedMotion, floor: Floor) -> Iterator[Diagnosis]:
+    """The whole body below the floor, at the end or in between; where the floor ends, not beside it."""
     whole, body = motion.whole, motion.scene.body
     highest = whole.position[:, 1] + depth_of(tuple(whole.orientation.T), tuple(body.semi_axes.tolist()))
     highest += np.max([offset_of(tuple(whole.orientation.T), vertex) for vertex in body.hull.tolist()], axis=0)
-    row = int(np.argmin(highest))
-    if highest[row] < -TOUCHING * body.size:
+    row, below = int(np.argmin(highest)), highest < -TOUCHING * body.size
+    enters = int(np.argmax(below))
+    passes = floor.half_extents is None or (enters > 0 and (np.abs(whole.position[enters, [0, 2]]) <= floor.half_extents).all())
+    if below[row] and passes:
         depth = -float(lowest_height(motion.scene, whole[row : row + 1])[0])
         yield Diagnosis(
             "tunnels", "below the floor", depth, f"the whole body is below the floor at t = {whole.t[row]:.4g} s, down to {depth:.3g} m"

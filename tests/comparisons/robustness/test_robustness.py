@@ -21,6 +21,7 @@ from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, Sca
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.scenarios import DropspinError, Trajectory, load, truth_for
+from dropspin.scenarios.surfaces import Floor
 
 DT = 5e-3
 SCENES = ("spin-principal", "spin-asymmetric", "drop-ball-lively", "drop-box-flat", "rock-block")
@@ -159,6 +160,18 @@ def test_body_that_is_below_the_floor_in_between_tunnels(row):
             "drop-ball-lively", moved(HEIGHT, lambda t, x, to=0.1 - depth: (np.arange(len(t)) == row) * (to - x[:, HEIGHT]))
         )
         assert (diagnose(lowered, 0.1).mode == "tunnels") is (depth > 0.2)
+
+
+@pytest.mark.parametrize(("side", "mode"), [(0.0, "tunnels"), (3.0, "sound")])
+def test_body_falls_through_a_floor_that_ends_or_beside_it(side, mode):
+    """Without an exact solution, no error tells."""
+    table = {"restitution": 0.5, "friction": "none", "half_extents": [0.5, 0.5], "thickness": 0.05}
+    scene = load("drop-ball").model_copy(update={"floor": Floor(**table), "expect": ()})
+    falling = np.tile(scene.initial_state, (100, 1))
+    falling[:, 0] = side * np.arange(100) / 100
+    falling[:, HEIGHT] -= 0.03 * np.arange(100)
+    motion = Trajectory.from_states(DT * np.arange(100), falling)
+    assert diagnose(ExtendedMotion(scene, DT, motion, motion, None), 0.1).mode == mode
 
 
 @pytest.mark.parametrize("restitution", [0.3, 0.5, 0.9])

@@ -119,7 +119,7 @@ def explained_by(shares: Mapping[str, float], error: str) -> str:
     names, sizes = [name.replace(", ", " and ") for name in shares], [f"{rounded(100.0 * share, 3)} %" for share in shares.values()]
     are_together = any(", " in name for name in shares)
     explain = "explain" if are_together else "explains"
-    if sum(shares.values()) > SEVERAL:
+    if len(shares) > 1 and sum(shares.values()) > SEVERAL:
         return f"either {', or '.join(names)} {explain} {sizes[0]} {error}"
     if are_together:
         return f"{names[0]} together explain {sizes[0]} {error}; neither alone explains 90 %"

@@ -6,7 +6,7 @@ import pytest
 
 from dropspin.reports.pages import with_minus, with_names
 from dropspin.reports.stories.matrix import level
-from dropspin.reports.stories.numbers import duration, failing, formatted, left_out
+from dropspin.reports.stories.numbers import duration, explained_by, failing, formatted, left_out
 
 
 @pytest.mark.parametrize(
@@ -84,3 +84,16 @@ def test_negative_numbers_on_pages_have_a_minus_sign_but_what_may_be_copied_has_
 )
 def test_sentences_of_pages_name_engines_but_commands_have_their_labels(text, shown):
     assert with_names(text) == shown
+
+
+@pytest.mark.parametrize(
+    ("shares", "text"),
+    [
+        ({"a": 1.04}, "a explains 104 % of it"),
+        ({"a, b": 1.04}, "a and b together explain 104 % of it; neither alone explains 90 %"),
+        ({"a": 1.0, "b": 1.0}, "either a, or b explains 100 % of it"),
+        ({"a": 0.7, "b": 0.3}, "a explains 70 % of it, and b 30 %"),
+    ],
+)
+def test_alternatives_are_named_where_there_are_several(shares, text):
+    assert explained_by(shares, "of it") == text

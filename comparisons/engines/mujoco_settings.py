@@ -10,7 +10,8 @@ from dropspin.comparisons.engines.options import Setting, spelled
 
 ANY = -float("inf")
 IMPEDANCE = 0.9999  # the largest that MuJoCo allows
-OVERRIDDEN = (("override", "enable"),)
+OVERRIDDEN, OF_EACH = ("override", "enable"), ("override", "disable")
+SEARCHES = ("solver", "CG", "Newton")
 CONTACT = {
     "condim": Setting("3", "dimensions of a contact", why="1 without friction, 3 with", values=("1", "3", "4", "6"), is_computed=True),
     "friction": Setting(
@@ -25,7 +26,7 @@ CONTACT = {
         why="[0, -(1 + e)/dt]: a damper that turns v into -e v in one step; with the default spring the restitution is 0.13 for any e",
         least=ANY,
         is_computed=True,
-        needs=(("kappa", "0"), ("spring_steps", "0")),
+        needs=(("kappa", "0"), ("spring_steps", "0"), OF_EACH),
     ),
     "solimp": Setting(
         (0.9, 0.95, 0.001, 0.5, 2.0),
@@ -33,6 +34,7 @@ CONTACT = {
         (IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0),
         "the hardest contact that MuJoCo allows, at any depth; at the default 0.9 to 0.95, restitution 0.5 becomes 0.466 at 0.25 ms, and "
         "boxes rest 2 mm deep",
+        needs=(OF_EACH,),
     ),
     "solreffriction": Setting(
         (0.0, 0.0),
@@ -43,7 +45,7 @@ CONTACT = {
         is_computed=True,
         needs=(("profile", "calibrated"),),
     ),
-    "margin": Setting(0.0, "distance at which a contact begins", unit="m", least=ANY),
+    "margin": Setting(0.0, "distance at which a contact begins", unit="m", least=ANY, needs=(OF_EACH,)),
     "gap": Setting(0.0, "distance beyond the margin at which a contact is listed", unit="m", least=ANY),
 }
 """Of the pairs of the body with floor and walls; in the default profile of their geoms."""
@@ -67,17 +69,17 @@ OPTION = {
     "solver": Setting("Newton", "algorithm of the solver", values=WORDS["solver"]),
     "iterations": Setting(100, "of the solver, at most"),
     "tolerance": Setting(1e-8, "at which the solver ends"),
-    "ls_iterations": Setting(50, "of the solver's line search, at most"),
-    "ls_tolerance": Setting(0.01, "at which the line search ends"),
+    "ls_iterations": Setting(50, "of the solver's line search, at most", needs=(SEARCHES,)),
+    "ls_tolerance": Setting(0.01, "at which the line search ends", needs=(SEARCHES,)),
     "noslip_iterations": Setting(0, "of the solver that takes slip away afterwards"),
     "noslip_tolerance": Setting(1e-6, "at which it ends"),
     "impratio": Setting(1.0, "ratio of the impedances of friction and normal force"),
     "density": Setting(0.0, "density of the medium", unit="kg/m³"),
     "viscosity": Setting(0.0, "viscosity of the medium", unit="Pa s"),
     "wind": Setting((0.0, 0.0, 0.0), "velocity of the medium", unit="m/s", least=ANY),
-    "o_margin": Setting(0.0, "margin of all contacts", unit="m", least=ANY, needs=OVERRIDDEN),
-    "o_solref": Setting((0.02, 1.0), "solref of all contacts", least=ANY, needs=OVERRIDDEN),
-    "o_solimp": Setting((0.9, 0.95, 0.001, 0.5, 2.0), "solimp of all contacts", needs=OVERRIDDEN),
+    "o_margin": Setting(0.0, "margin of all contacts", unit="m", least=ANY, needs=(OVERRIDDEN,)),
+    "o_solref": Setting((0.02, 1.0), "solref of all contacts", least=ANY, needs=(OVERRIDDEN,)),
+    "o_solimp": Setting((0.9, 0.95, 0.001, 0.5, 2.0), "solimp of all contacts", needs=(OVERRIDDEN,)),
 }
 """Of the table option."""
 SWITCHES = ("disable", "enable")

@@ -43,6 +43,8 @@ def falling(duration=1.0, floor=FLOOR):
         ("mujoco[iterations=1.5]", "a whole number from 0, by default 100"),
         ("pybullet[useSplitImpulse=2]", "a whole number from 0 to 1"),
         ("mujoco[kappa=0.002,solref=0.02 1]", "solref has no effect with kappa=0.002; it needs kappa=0"),
+        ("mujoco[override=enable,solref=0.1 1]", "solref has no effect with override=enable; it needs override=disable"),
+        ("mujoco[solver=PGS,ls_iterations=3]", "ls_iterations has no effect with solver=PGS; it needs solver=CG or solver=Newton"),
         ("mujoco[profile=default,solreffriction=0 -100]", "solreffriction has no effect with profile=default"),
         ("mujoco[o_solref=0.02 1]", "it needs override=enable"),
         ("pybullet[maxJointVelocity=100]", "maxJointVelocity has no effect with coordinates=maximal"),

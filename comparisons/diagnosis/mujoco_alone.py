@@ -16,14 +16,12 @@ from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of, overrides, plain
 from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, PLANE, MuJoCoFile, set_options
 from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, kind_of, mesh_of, quaternion, shape_of
+from dropspin.comparisons.diagnosis.mujoco_text import FRICTION
 from dropspin.comparisons.diagnosis.parts import VOLUMES
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
 from dropspin.scenarios.state import UP, Array
 from dropspin.scenarios.truths.soft_rest import GeomSettings, SoftContact
-
-FRICTION = (0, 2, 3)
-"""The coefficients of a pair that a geometry has: sliding, torsional, rolling."""
 
 
 class MuJoCoAlone:
@@ -181,17 +179,16 @@ class MuJoCoAlone:
         is_safe = not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE
         return np.array([max(constant, 2.0 * option.timestep) if constant > 0.0 and is_safe else constant, ratio])
 
-    @property
-    def touching(self) -> dict[str, Any] | None:
-        """The settings in force of the first contact pair."""
-        return next(map(self._in_force, self.pairs.values()), None)
+    def in_force_of(self, geom: int) -> dict[str, Any]:
+        """The settings in force of the contact of a geometry."""
+        return self._in_force(self.pairs[geom])
 
     @property
     def contact(self) -> SoftContact | None:
         """The contact of a body with one contact pair."""
-        touching = self.touching
-        if touching is None or len(self.pairs) != 1:
+        if len(self.pairs) != 1:
             return None
+        touching = self.in_force_of(*self.pairs)
         option = self.model(self.file.model.opt.timestep, np.zeros(3), floor=False).opt
         friction = tuple(touching["friction"][list(FRICTION)].tolist())
         names = ("solref", "solimp", "condim", "margin")

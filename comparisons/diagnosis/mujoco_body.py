@@ -29,6 +29,8 @@ FLAT = 1e-9
 SPRING_STEPS = 20.0
 """Time steps of an impact on a spring that gives a coefficient of restitution."""
 LEAST_OF_A_SPRING = 0.01
+SAME_HEIGHT = 1e-6
+"""Difference of heights, relative to the size, up to which geometries touch a surface together."""
 DEEP = 0.01
 """Depth, relative to the size, from which a body that starts inside a surface is said to."""
 LEVEL = 0.1
@@ -71,12 +73,14 @@ class MuJoCoBody(LooseBody):
     def __init__(self, name: str, alone: MuJoCoAlone) -> None:
         self._name, self._alone, self._file, self.remedies = name, alone, alone.file, REMEDIES
         self.causes = CAUSES
-        self._text = BodyText(alone.file, alone.head, alone.surface)
         self._model = alone.model(alone.file.model.opt.timestep, np.zeros(3), floor=False)
         found = mass_properties(self._model, self._at_rest, range(1, self._model.nbody))
         assert found is not None  # bodies without mass are left out
         self._properties: MassProperties = found
         self._offset = found.centre
+        self._pose = multiply(alone.level, np.roll(alone.file.data.xquat[alone.head], -1))
+        self._touching = {geom: alone.in_force_of(geom) for geom in self._lowest}
+        self._text = BodyText(alone.file, alone.head, alone.surface, self._touching)
         self.facts = self._facts()
 
     def changed(self, changes: Changes) -> LooseBody:
@@ -133,16 +137,18 @@ class MuJoCoBody(LooseBody):
         alone, file = self._alone, self._file
         off = alone.gravity_angle
         is_above = off < 90.0 - LEVEL  # also without gravity
-        touching = alone.touching if is_above else None
+        touching = next(iter(self._touching.values()), None) if is_above else None
         surface = None if touching is None else alone.surface
         raised = any(not np.array_equal(alone.clamped(pair), pair["solref"]) for pair in alone.pairs.values())
         drag, option = Drag(*alone.damping), self._model.opt
         unmodelled = {"frictionloss": self._model.dof_frictionloss.any(), "density": option.density, "viscosity": option.viscosity}
-        pose = multiply(alone.level, np.roll(file.data.xquat[alone.head], -1))
-        inside = 0.0 if surface is None or self._names[surface] == ADDED else self._start_inside(pose)
+        inside = 0.0 if surface is None or self._names[surface] == ADDED else self._start_inside(self._pose)
         start = [f"a start {inside:.3g} m inside the surface"] * (inside > DEEP * self._model.stat.extent)
         tilted = [f"a gravity {off:.3g}° from the inward normal of the surface"] * (off > LEVEL)
-        frictions = [0.0, 0.0] if touching is None or touching["condim"] == 1 else touching["friction"][[1, 0]].tolist()
+        every = {(0.0, 0.0) if one["condim"] == 1 else tuple(one["friction"][[1, 0]].tolist()) for one in self._touching.values()}
+        frictions = (0.0, 0.0) if touching is None else next(iter(every)) if len(every) == 1 else (math.nan, math.nan)
+        names = ", ".join(self._names[geom] for geom in self._touching)
+        several = [f"a slide on geometries of different friction ({names})"] * (len(every) > 1)
         return Facts(
             name=self._name,
             engine="MuJoCo",
@@ -153,7 +159,7 @@ class MuJoCoBody(LooseBody):
             inertia=self._properties.inertia,
             offset=self._offset,
             parts=self._parts,
-            pose=pose,
+            pose=self._pose,
             resistance=joint_damping(*alone.damping),
             falls=drag,
             spins=(drag, drag, drag),
@@ -164,13 +170,13 @@ class MuJoCoBody(LooseBody):
             others=[self._names[geom] for geom in alone.others],
             friction=frictions[0],
             friction_across=math.nan if frictions[0] == frictions[1] else frictions[1],
-            margin=0.0 if touching is None else float(touching["margin"] - lowers_margin() * touching["gap"]),
+            margin=0.0 if touching is None else _margin(touching),
             rolling=touching is not None and touching["condim"] == 6 and bool(np.any(touching["friction"][3:])),
-            rest_depth=self._rest_depth(pose),
+            rest_depth=self._rest_depth(self._pose),
             written=self._text.written,
             settings=self._text.settings,
             ignored=list(self._text.ignored(self._properties, raised=raised, condim=0 if touching is None else int(touching["condim"]))),
-            unmodelled=[*file.unmodelled(alone.head), *start, *tilted, *[alone.left_out] * bool(alone.left_out)],
+            unmodelled=[*file.unmodelled(alone.head), *start, *tilted, *several, *[alone.left_out] * bool(alone.left_out)],
             missed=alone.missed if is_above and file.gravity.any() else "",
             left_out=alone.left_out,
         )
@@ -185,8 +191,24 @@ class MuJoCoBody(LooseBody):
         shape, shift, turned = shape_of(model, number)
         turn = quaternion(data.geom_xmat[number])
         position = data.geom_xpos[number] - self._offset + rotate(turn, shift)
-        geom, pairs = self._alone.geoms[int(model.geom(number).name.split()[1])], self._alone.pairs
+        geom, pairs = self._own[number], self._alone.pairs
         return Part(self._names[geom], shape, position, multiply(turn, turned), not pairs or geom in pairs)
+
+    @property
+    def _lowest(self) -> list[int]:
+        """The geometries that touch a level surface first in the pose of the file."""
+        heights, start = {}, np.concatenate([np.zeros(3), self._pose, np.zeros(6)])[np.newaxis]
+        for geom, part in zip(self._own, self._parts, strict=True):
+            if geom in self._alone.pairs:
+                contact = self._alone.in_force_of(geom)
+                heights[geom] = Support([part]).lowest(start)[0] - _margin(contact)
+        tolerance = SAME_HEIGHT * self._model.stat.extent
+        return [geom for geom, height in heights.items() if height <= min(heights.values()) + tolerance]
+
+    @property
+    def _own(self) -> list[int]:
+        """The numbers of the geometries in the file, in the order of the model alone."""
+        return [self._alone.geoms[int(self._model.geom(number).name.split()[1])] for number in range(self._model.ngeom)]
 
     @cached_property
     def _names(self) -> list[str]:
@@ -223,3 +245,8 @@ class MuJoCoBody(LooseBody):
         places = data.contact.pos[:, [0, 2]]
         is_even = len(places) > 0 and bool(np.abs(places.mean(axis=0)).max() < 1e-6 * size)
         return len(places) if is_even and np.ptp(np.linalg.norm(places, axis=1)) < 1e-6 * size else 0
+
+
+def _margin(contact: Mapping[str, Any]) -> float:
+    """The height above the surface from which a contact acts [m]."""
+    return float(contact["margin"] - lowers_margin() * contact["gap"])

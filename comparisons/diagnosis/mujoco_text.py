@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -11,15 +12,16 @@ from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, digits
 from dropspin.comparisons.diagnosis.loose_body import MassProperties
 from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
 from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
-from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile
+from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, owner_of, pair_element
+from dropspin.comparisons.diagnosis.mujoco_file import BODY, MuJoCoFile
 from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
 from dropspin.comparisons.diagnosis.urdf_file import for_other_simulators
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
 
 OF_JOINT = ("damping", "armature", "frictionloss")
-MOST_URGENT = 9
-"""A priority of which a geometry's contact settings count alone."""
+FRICTION = (0, 2, 3)
+"""The coefficients of a pair that a geometry has: sliding, torsional, rolling."""
 SAME = 1e-6
 """Relative difference up to which a moment of inertia is the one that was written."""
 IN_FORCE = {"lateral_friction": 1.0, "rolling_friction": 0.0, "spinning_friction": 0.0, "restitution": 0.0}
@@ -41,20 +43,22 @@ class BodyText:
         file: The file.
         head: The number of the body.
         surface: The number of the geometry that it lands on.
+        contacts: The settings of the contacts with it, by the numbers of the geometries that touch it.
     """
 
-    def __init__(self, file: MuJoCoFile, head: int, surface: int | None) -> None:
-        self._file, self._head, self._surface = file, head, surface
+    def __init__(self, file: MuJoCoFile, head: int, surface: int | None, contacts: Mapping[int, Mapping[str, Any]]) -> None:
+        self._file, self._head, self._surface, self._contacts = file, head, surface, contacts
 
     @cached_property
     def element(self) -> Element | None:
-        """The body in the file: by its name, or by its place if the file has as many bodies as the model."""
-        bodies = list(self._file.source.every("link" if self._file.is_urdf else "body"))
-        name = mujoco.mj_id2name(self._file.model, BODY, self._head)
-        named = [element for element in bodies if name and element.attributes.get("name") == name]
-        if not named and len(bodies) == self._file.model.nbody - 1:
-            named = bodies[self._head - 1 : self._head]
-        return named[0] if named else None
+        """The body in the file."""
+        return body_element(self._file, self._head)
+
+    @cached_property
+    def _bodies(self) -> list[Element]:
+        """The body and what is welded to it, in the file."""
+        found = [body_element(self._file, body) for body in self._file.group(self._head)]
+        return [element for element in found if element is not None]
 
     @cached_property
     def written(self) -> MassProperties | None:
@@ -69,7 +73,7 @@ class BodyText:
     @cached_property
     def _tensor(self) -> Array | None:
         """The tensor that is written for a body to which nothing is welded, about the axes of its inertial frame."""
-        inertial = None if self.element is None else next(self.element.every("inertial"), None)
+        inertial = None if self.element is None else next(iter(children_of(self.element, "inertial")), None)
         if inertial is None or len(self._file.group(self._head)) > 1:
             return None
         values = inertial.attributes
@@ -89,9 +93,9 @@ class BodyText:
         of_all = {name: option_setting(root, "option", f"o_{name}", "") for name in overrides(self._file.model)}
         if body is None:
             return found
-        places: dict[str, list[Element]] = {"gravcomp": [body]} | dict.fromkeys(OF_JOINT, self._joint)
-        places |= dict.fromkeys(("margin", "solref", "solimp", "friction", "condim", "contype", "conaffinity"), self._geoms)
-        inertial = next(body.every("inertial"), None)
+        places: dict[str, list[Element]] = {"gravcomp": self._bodies} | dict.fromkeys(OF_JOINT, self._joint)
+        places |= dict.fromkeys(("margin", "solref", "solimp", "friction", "condim", "contype", "conaffinity"), self._of_contact)
+        inertial = next(iter(children_of(body, "inertial")), None)
         written = {name: [mjcf_setting(one, name) for one in elements] for name, elements in places.items()}
         if inertial is not None:
             tensor = next(inertial.every("inertia"), None)  # of URDF
@@ -105,21 +109,22 @@ class BodyText:
     @cached_property
     def _joint(self) -> list[Element]:
         """The joint of the body."""
-        return [] if self.element is None else [child for child in self.element.children if child.tag in ("joint", "freejoint")][:1]
+        return [] if self.element is None else children_of(self.element, "joint", "freejoint")[:1]
 
     @cached_property
-    def _geoms(self) -> list[Element]:
-        """The geometries of the body, and the one that it lands on, by its name or, in the world, by its place."""
-        own = [] if self.element is None else [child for child in self.element.children if child.tag == "geom"]
-        others, model, surface = [geom for geom in self._file.source.every("geom") if geom not in own], self._file.model, self._surface
-        if surface is None:
-            return own
-        name = mujoco.mj_id2name(model, GEOM, surface)
-        named = [geom for geom in others if name and geom.attributes.get("name") == name]
-        of_world = [geom for geom in others if geom.parent is not None and geom.parent.tag == "worldbody"]
-        if len(of_world) == model.body_geomnum[0] - 1:  # without the plane that is added
-            named = named or of_world[surface : surface + 1]
-        return [*own, *named]
+    def _of_contact(self) -> list[Element]:
+        """What sets the contact: the pairs, the geometries that touch, or all if none does, and the one that the body lands on."""
+        group = self._file.group(self._head)
+        touching = list(self._contacts) or [geom for geom, body in enumerate(self._file.model.geom_bodyid) if body in group]
+        geoms = touching if self._surface is None else [*touching, self._surface]
+        found = [*self._pairs, *(geom_element(self._file, geom) for geom in geoms)]
+        return [element for element in found if element is not None]
+
+    @cached_property
+    def _pairs(self) -> list[Element]:
+        """The pairs of the file whose settings are those of the contact."""
+        found = [pair_element(self._file, geom, self._surface) for geom in self._contacts if self._surface is not None]
+        return [pair for pair in found if pair is not None]
 
     def patch(self, options: Mapping[str, object], others: Mapping[str, object]) -> str:
         """Elements to write for changes of options, and of the joint, the geometries and the body: changed ones with their lines.
@@ -137,13 +142,26 @@ class BodyText:
             found += [Setting("<freejoint/>", joint.file, joint.line) for joint in self._joint] or ["<freejoint/>"]
         elif of_joint := {name: value for name, value in others.items() if name in OF_JOINT}:
             found += [joint.changed(of_joint) for joint in self._joint]
-        if "gravcomp" in others and self.element is not None:
-            found.append(self.element.changed({"gravcomp": others["gravcomp"]}))
-        if "margin" in others:
-            found += [geom.changed({"margin": 0}) for geom in self._geoms if mjcf_setting(geom, "margin") is not None]
-        if contact := {name: value for name, value in others.items() if name in ("solref", "solimp")}:
-            found += [geom.changed(contact | {"priority": MOST_URGENT}) for geom in self._geoms[:1]]
+        if "gravcomp" in others:
+            found += [body.changed({"gravcomp": others["gravcomp"]}) for body in self._bodies if "gravcomp" in body.attributes]
+        if contact := {name: value for name, value in others.items() if name in ("solref", "solimp", "margin")}:
+            found += [pair.changed(contact) for pair in self._pairs] or self._contact_of_geoms(contact)
         return ", ".join(map(str, found)) or " ".join(f'{name}="{value}"' for name, value in others.items())
+
+    def _contact_of_geoms(self, changes: Mapping[str, object]) -> list[Setting]:
+        """The geometries with other settings of the contact: margins add, and of the others those of the larger priority count alone."""
+        model = self._file.model
+        if "margin" in changes:
+            return [geom.changed({"margin": 0}) for geom in self._of_contact if mjcf_setting(geom, "margin") is not None]
+        found = []
+        for number, contact in self._contacts.items():
+            kept = {"friction": contact["friction"][list(FRICTION)], "condim": np.array([contact["condim"]])}
+            kept = {name: value for name, value in kept.items() if np.any(value != getattr(model, f"geom_{name}")[number])}
+            texts = {name: " ".join(f"{one:g}" for one in value) for name, value in kept.items()}
+            priority = 1 + model.geom_priority[[number, self._surface]].max()
+            element = geom_element(self._file, number)
+            found += [] if element is None else [element.changed({**changes, "priority": priority, **texts})]
+        return found
 
     def ignored(self, in_force: MassProperties, *, raised: bool, condim: int) -> Iterator[tuple[str, Setting, str]]:
         """What the file says and MuJoCo changes or does not use.
@@ -227,7 +245,7 @@ class BodyText:
         has, least = (mass_properties(*compiled, group) for compiled in ((self._file.model, self._file.data), self._file.without_visual))
         if has is None or least is None or not has.mass - least.mass > NOTEWORTHY * has.mass:
             return
-        model, elements = self._file.model, [geom for geom in self.element.every("geom") if _body_of(geom) is self.element]
+        model, elements = self._file.model, [geom for geom in self.element.every("geom") if owner_of(geom) is self.element]
         geoms = np.flatnonzero(model.geom_bodyid == self._head)
         pairs = zip(geoms, elements, strict=True) if len(geoms) == len(elements) else ()
         visual = [element for geom, element in pairs if not (model.geom_contype[geom] or model.geom_conaffinity[geom])]
@@ -242,11 +260,3 @@ class BodyText:
         if written is None:
             return name, why[0] if why else Setting(name), made
         return name, written, made + (f", by {why[0]}" if why else "")
-
-
-def _body_of(geom: Element) -> Element | None:
-    """The body that a geometry is part of, also if it is within frames."""
-    place = geom.parent
-    while place is not None and place.tag not in ("body", "worldbody"):
-        place = place.parent
-    return place

@@ -1,0 +1,69 @@
+"""Bodies of several geometries, pairs and links in MJCF: the settings and the remedies are those of what touches."""
+
+import math
+
+import pytest
+from support.model_files import FREE, body_of, findings_of
+
+from dropspin.comparisons.diagnosis.landing import rest
+
+LID = '<geom name="lid" type="box" size=".1 .1 .01" pos="0 0 .05" mass=".1" friction="1.5"/>'
+SOLE = '<geom name="sole" type="box" size=".1 .1 .04" mass="1" {}/>'
+SPRING = {"solref": "0 -750", "solimp": "0.9999 0.9999 0.001 0.5 2"}
+
+
+def test_settings_are_those_of_the_geometry_that_touches(tmp_path):
+    body = body_of(tmp_path, FREE.format(LID + SOLE.format('friction="2" margin=".01"')))
+    assert (body.facts.friction, body.facts.margin) == (2.0, 0.01)
+    [(_, found)] = findings_of(body, rest)
+    assert [remedy.text.split()[1] for remedy in found.remedies] == ['name="sole"']
+    assert body.patch(SPRING, body.facts.dt).startswith('<geom name="sole"')
+
+
+def test_geometries_of_different_friction_that_touch_together_have_none_in_common(tmp_path):
+    feet = "".join(f'<geom name="f{y}" size=".05" pos="0 {y} 0" friction="{2 + y}"/>' for y in (-1, 0, 1))
+    facts = body_of(tmp_path, FREE.format(feet)).facts
+    assert math.isnan(facts.friction)
+    assert facts.unmodelled == ["a slide on geometries of different friction (f-1, f0, f1)"]
+
+
+@pytest.mark.parametrize(
+    ("floor", "geom"),
+    [
+        ("", ""),
+        ('priority="12"', ""),
+        ("", 'friction=".3"'),
+        ('priority="2" friction=".3" condim="4"', 'priority="1" friction=".8"'),
+    ],
+)
+def test_remedy_of_a_contact_is_in_force_and_keeps_friction(tmp_path, floor, geom):
+    """The remedy written into the file: what MuJoCo then mixes of both geometries."""
+    ground = f'<geom name="ground" type="box" size="9 9 .1" {floor}/>'
+    body = body_of(tmp_path, ground + FREE.format(f'<geom name="g" type="box" size=".1 .1 .04" {geom}/>'), on="ground")
+    patched = body.patch(SPRING, body.facts.dt).rpartition(" (")[0]
+    other = body_of(tmp_path, ground + FREE.format(patched), on="ground")
+    [before], [after] = body._touching.values(), other._touching.values()
+    assert after["solref"] == pytest.approx([0, -750])
+    assert after["friction"] == pytest.approx(before["friction"])
+    assert after["condim"] == before["condim"]
+
+
+def test_settings_and_remedies_of_a_pair_are_its_own(tmp_path):
+    pair = '<contact><pair geom1="floor" geom2="g" margin=".01" solref="0.001 1"/></contact>'
+    body = body_of(tmp_path, FREE.format('<geom name="g" size=".05" margin=".001" solref="0.05 1"/>'), head=pair)
+    assert body.facts.settings["solref"].text == 'solref="0.001 1"'
+    assert body.patch({"margin": 0.0}, body.facts.dt).startswith('<pair geom1="floor" geom2="g" margin="0"')
+    assert body.patch(SPRING, body.facts.dt).startswith('<pair geom1="floor" geom2="g" margin=".01" solref="0 -750"')
+
+
+def test_inertial_of_a_child_is_not_its_parents(tmp_path):
+    arm = '<body pos=".2 0 0"><joint/><inertial pos="0 0 0" mass="2" diaginertia="5 5 5"/></body>'
+    body = body_of(tmp_path, FREE.format(f'<geom type="box" size=".1 .1 .04"/>{arm}'), name="b")
+    assert body.facts.written.inertia.max() < 1.0
+    assert "inertia" not in body.facts.settings
+
+
+def test_geometry_and_joint_within_frames_have_their_lines(tmp_path):
+    world = '<body name="b" pos="0 0 1">\n<frame><joint type="free" damping=".1"/>\n<geom size=".05" margin=".004"/></frame></body>'
+    settings = body_of(tmp_path, world).facts.settings
+    assert (settings["damping"].line, settings["margin"].line) == (2, 3)

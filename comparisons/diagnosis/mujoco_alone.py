@@ -23,6 +23,9 @@ from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
 from dropspin.scenarios.state import UP, Array
 from dropspin.scenarios.truths.soft_rest import GeomSettings, SoftContact
 
+WIDE = 100.0
+"""Half the width of a box that a body lands on [m]."""
+
 
 class MuJoCoAlone:
     """A body, with what is welded to it, and the surface.
@@ -30,7 +33,7 @@ class MuJoCoAlone:
     Args:
         file: The file.
         name: The body's name.
-        on: The name of the geometry that it lands on; by default the first plane or box of the world that it collides with.
+        on: The name of the geometry that it lands on; by default the plane or box of the world below it that it collides with.
         changes: Settings that differ from those of the file.
 
     Attributes:
@@ -157,12 +160,13 @@ class MuJoCoAlone:
         return found | {"meshname": name}
 
     def _add_surface(self, spec: Any) -> None:
-        """What the body lands on, level and with its top at y = 0, and the contact pairs."""
+        """What the body lands on, level and with its top at y = 0, and the contact pairs; a box is so wide that no body leaves it."""
         file, old = self.file, self.file.model
         assert self.surface is not None
         turn = multiply(self.level, quaternion(file.data.geom_xmat[self.surface]))
-        top = old.geom_size[self.surface] @ np.abs(unrotate(turn, UP)) if old.geom_type[self.surface] == BOX else 0.0
-        at = {"pos": -top * UP, "quat": np.roll(turn, 1)}
+        size, up = old.geom_size[self.surface], np.abs(unrotate(turn, UP))
+        is_box = old.geom_type[self.surface] == BOX
+        at = {"pos": -(size @ up) * is_box * UP, "quat": np.roll(turn, 1), "size": np.where(is_box & (up < 0.5), WIDE, size)}
         spec.worldbody.add_geom(name="surface", contype=0, conaffinity=0, **self._geom(spec, self.surface) | at)
         for geom, pair in self.pairs.items():
             spec.add_pair(geomname1="surface", geomname2=f"own {self.geoms.index(geom)}", **self._in_force(pair))

@@ -13,7 +13,7 @@ import numpy as np
 from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mujoco_compiled import placed
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of
-from dropspin.comparisons.diagnosis.mujoco_shapes import kind_of
+from dropspin.comparisons.diagnosis.mujoco_shapes import ALONG, distance_to, kind_of
 from dropspin.comparisons.diagnosis.source import option_setting, read_source
 from dropspin.comparisons.diagnosis.urdf_file import package_remedy, verify_one_root
 from dropspin.comparisons.engines.mujoco_simulation import quiet
@@ -212,11 +212,34 @@ class MuJoCoFile:
         return found
 
     def surfaces(self, own: Sequence[int]) -> list[int]:
-        """The planes, then the boxes, of the world that some geometries collide with, and if there is none, a plane that is added."""
-        added, still = self.names(GEOM)[ADDED], self._still(own)
-        ranked = [geom for kind in SURFACES for geom in still if self.model.geom_type[geom] == kind]
-        found = [geom for geom in ranked if self._collide(own, geom)]
-        return found or [added] * self._collide(own, added)
+        """The planes and boxes of the world that some geometries collide with: those below them by height, then the other ones.
+
+        A plane that is added if there is none, or if none of them is below, and something of another kind may be.
+        """
+        found = self._planes_and_boxes(own)
+        return found if found and not self.left_out(own) else [self.names(GEOM)[ADDED]] * self._collide(own, self.names(GEOM)[ADDED])
+
+    def _planes_and_boxes(self, own: Sequence[int]) -> list[int]:
+        """The planes and boxes that some geometries collide with: those below, planes that gravity does not lead away from, boxes."""
+        found = [geom for geom in self._still(own) if int(self.model.geom_type[geom]) in map(int, SURFACES) and self._collide(own, geom)]
+
+        def rank(geom: int) -> tuple[float, bool, bool]:
+            is_plane = self.model.geom_type[geom] == PLANE
+            return self.height_above(geom, own), is_plane and self.data.geom_xmat[geom][[2, 5, 8]] @ self._down > -ALONG, not is_plane
+
+        return sorted(found, key=rank)
+
+    def height_above(self, surface: int, own: Sequence[int]) -> float:
+        """The height of the centre of mass of the bodies of some geometries above a plane or a box [m]; infinite beside or below it."""
+        bodies = np.unique(self.model.geom_bodyid[own])
+        centre = np.average(self.data.xipos[bodies], axis=0, weights=self.model.body_mass[bodies] + LEAST)
+        return distance_to(self.model, self.data, surface, centre, self._down)
+
+    @property
+    def _down(self) -> Array:
+        """The direction of gravity, or of -z without it."""
+        size = np.linalg.norm(self.gravity)
+        return self.gravity / size if size else np.array([0.0, 0.0, -1.0])
 
     def missed(self, own: Sequence[int]) -> str:
         """A plane of the world that some geometries fall through, and why; empty if there is none, or something else to land on."""
@@ -228,12 +251,13 @@ class MuJoCoFile:
         return f"{names[planes[0]]} does not hold it, because {why if own else 'the body has no geometry'}"
 
     def left_out(self, own: Sequence[int]) -> str:
-        """The geometries of the world that some geometries collide with, if none is a plane or a box; empty if there is none."""
+        """The geometries of the world that some collide with and that are no planes and boxes, if none of these is below; else empty."""
         names = list(self.names(GEOM))
         found = [geom for geom in self._still(own) if self.has_contacts and self._collide(own, geom)]
-        if any(int(self.model.geom_type[geom]) in map(int, SURFACES) for geom in found):
+        flat = [geom for geom in found if int(self.model.geom_type[geom]) in map(int, SURFACES)]
+        if any(math.isfinite(self.height_above(geom, own)) for geom in flat):
             return ""
-        words = [f"the {kind_of(self.model, geom)} {names[geom]}" for geom in found]
+        words = [f"the {kind_of(self.model, geom)} {names[geom]}" for geom in found if geom not in flat]
         return f"{', '.join(words[:MOST_LISTED])}{' and others' * (len(words) > MOST_LISTED)}"
 
     def _still(self, own: Sequence[int]) -> list[int]:
@@ -246,7 +270,7 @@ class MuJoCoFile:
         return any(contact_of(self.model, one, other) for one in own)
 
     def surface(self, wanted: str | None, own: Sequence[int]) -> int | None:
-        """The geometry that some geometries land on: the one named, or the first one.
+        """The geometry that some geometries land on: the one named, or the first of those that they may land on.
 
         Raises:
             DropspinError: There is no such geometry, or it is neither a plane nor a box.

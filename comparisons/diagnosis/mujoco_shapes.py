@@ -12,6 +12,8 @@ from dropspin.scenarios.state import Array
 
 MODELLED = [getattr(mujoco.mjtGeom, f"mjGEOM_{kind}") for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")]
 """The kinds of geometries of bodies."""
+ALONG = 1e-3
+"""Cosine up to which a direction is along a plane, and not into it."""
 STRAIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 
 
@@ -44,3 +46,15 @@ def quaternion(matrix: Array) -> Array:
     found = np.empty(4)
     mujoco.mju_mat2Quat(found, matrix)
     return np.roll(found, -1)
+
+
+def distance_to(model: Any, data: Any, number: int, point: Array, direction: Array) -> float:
+    """The distance from a point to a plane or a box in a direction [m]; infinite if it is not there."""
+    turn = data.geom_xmat[number].reshape(3, 3)
+    start, along = (point - data.geom_xpos[number]) @ turn, direction @ turn
+    if model.geom_type[number] == mujoco.mjtGeom.mjGEOM_PLANE:
+        return float(-start[2] / along[2]) if along[2] < -ALONG and start[2] >= 0.0 else np.inf
+    with np.errstate(divide="ignore", invalid="ignore"):
+        faces = (np.array([[-1.0], [1.0]]) * model.geom_size[number] - start) / along
+    first, last = np.nanmax(faces.min(axis=0)), np.nanmin(faces.max(axis=0))
+    return float(first) if 0.0 <= first <= last else np.inf

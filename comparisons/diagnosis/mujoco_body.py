@@ -11,7 +11,7 @@ from mujoco import rollout
 
 from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
-from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties
+from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
 from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ENUMERATIONS, GEOM, OPTIONS, PLANE, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
@@ -48,6 +48,7 @@ REMEDIES: Mapping[str, Changes] = {
     "frictionloss": {"frictionloss": 0.0},
     "density": NO_FLUID,
     "viscosity": NO_FLUID,
+    "sleep_tolerance": {"sleep_tolerance": 0.0},
 }
 
 
@@ -142,8 +143,12 @@ class MuJoCoBody(LooseBody):
         raised = any(not np.array_equal(alone.clamped(pair), pair["solref"]) for pair in alone.pairs.values())
         drag, option = Drag(*alone.damping), self._model.opt
         unmodelled = {"frictionloss": self._model.dof_frictionloss.any(), "density": option.density, "viscosity": option.viscosity}
+        unmodelled["sleep_tolerance"] = sleeps(option)
         inside = 0.0 if surface is None or self._names[surface] == ADDED else self._start_inside(self._pose)
-        start = [f"a start {inside:.3g} m inside the surface"] * (inside > DEEP * self._model.stat.extent)
+        is_beside = surface is not None and file.model.geom_type[surface] != PLANE and math.isinf(file.height_above(surface, alone.geoms))
+        start = ["a start beside or below the surface"] * is_beside + [f"a start {inside:.3g} m inside the surface"] * (
+            inside > DEEP * self._model.stat.extent
+        )
         tilted = [f"a gravity {off:.3g}° from the inward normal of the surface"] * (off > LEVEL)
         every = {(0.0, 0.0) if one["condim"] == 1 else tuple(one["friction"][[1, 0]].tolist()) for one in self._touching.values()}
         frictions = (0.0, 0.0) if touching is None else next(iter(every)) if len(every) == 1 else (math.nan, math.nan)
@@ -164,7 +169,7 @@ class MuJoCoBody(LooseBody):
             falls=drag,
             spins=(drag, drag, drag),
             armature=alone.armature,
-            lifted=float(self._model.body_gravcomp[1]),
+            lifted=self._lifted,
             unknown=[name for name, acts in unmodelled.items() if acts],
             surface="" if surface is None else self._names[surface],
             others=[self._names[geom] for geom in alone.others],
@@ -180,6 +185,11 @@ class MuJoCoBody(LooseBody):
             missed=alone.missed if is_above and file.gravity.any() else "",
             left_out=alone.left_out,
         )
+
+    @cached_property
+    def _lifted(self) -> float:
+        """The share of the weight that `gravcomp` of the body and of what is welded to it takes away."""
+        return float(np.average(self._model.body_gravcomp[1:], weights=self._model.body_mass[1:]))
 
     @cached_property
     def _parts(self) -> Sequence[Part]:
@@ -217,11 +227,12 @@ class MuJoCoBody(LooseBody):
     def _rest_depth(self, pose: Array) -> float:
         """The depth of a body that rests on one point, or on several that share its weight, below the surface [m]; NaN of others."""
         contact, armature = self._alone.contact, self._alone.armature
-        points = 0 if contact is None or (armature and self._offset.any()) else self._points(pose)
+        is_central = not (armature and self._offset.any()) and self._lifted < 1.0 and not np.ptp(self._model.body_gravcomp[1:])
+        points = self._points(pose) if contact is not None and is_central else 0
         if not points or contact is None:
             return np.nan
         mass = self._properties.mass
-        load = float(np.linalg.norm(self._file.gravity)) * (1.0 - float(self._model.body_gravcomp[1])) * mass / (mass + armature) / points
+        load = float(np.linalg.norm(self._file.gravity)) * (1.0 - self._lifted) * mass / (mass + armature) / points
         return contact.depth(load) - contact.settings.margin
 
     def _start_inside(self, pose: Array) -> float:

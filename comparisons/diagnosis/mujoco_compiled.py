@@ -38,3 +38,8 @@ def lowers_margin() -> bool:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     return bool(data.contact.includemargin[0] < 2.0)
+
+
+def sleeps(option: Any) -> bool:
+    """Whether slow bodies sleep, which older versions of MuJoCo have not."""
+    return bool(option.enableflags & getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0) and option.sleep_tolerance)

@@ -90,6 +90,7 @@ class BodyText:
         root, body = self._file.source, self.element
         options = {"timestep": "0.002", "integrator": "Euler", "cone": "pyramidal", "impratio": "1", "density": "0", "viscosity": "0"}
         found = {name: option_setting(root, "option", name, default) for name, default in options.items()}
+        found["sleep_tolerance"] = option_setting(root, "flag", "sleep", "disable")
         of_all = {name: option_setting(root, "option", f"o_{name}", "") for name in overrides(self._file.model)}
         if body is None:
             return found

@@ -5,7 +5,9 @@ import math
 import pytest
 from support.model_files import FREE, body_of, findings_of
 
+from dropspin.comparisons.diagnosis.flight import fall
 from dropspin.comparisons.diagnosis.landing import rest
+from dropspin.comparisons.diagnosis.study import QUESTIONS
 
 LID = '<geom name="lid" type="box" size=".1 .1 .01" pos="0 0 .05" mass=".1" friction="1.5"/>'
 SOLE = '<geom name="sole" type="box" size=".1 .1 .04" mass="1" {}/>'
@@ -67,3 +69,29 @@ def test_geometry_and_joint_within_frames_have_their_lines(tmp_path):
     world = '<body name="b" pos="0 0 1">\n<frame><joint type="free" damping=".1"/>\n<geom size=".05" margin=".004"/></frame></body>'
     settings = body_of(tmp_path, world).facts.settings
     assert (settings["damping"].line, settings["margin"].line) == (2, 3)
+
+
+def test_gravcomp_of_a_welded_part_lifts_its_own_weight(tmp_path):
+    part = '<body name="w" gravcomp="1"><geom type="box" size=".1 .1 .02" mass="1" pos="0 0 .06"/></body>'
+    body = body_of(tmp_path, FREE.format(f'<geom type="box" size=".1 .1 .04" mass="1"/>{part}'))
+    [(answer, found)] = findings_of(body, fall)
+    assert answer.in_force == pytest.approx(0.25 * 9.81)
+    assert (found.kind, body.facts.settings["gravcomp"].text) == ("setting", 'gravcomp="1"')
+    assert found.remedies[0].text == '<body name="w" gravcomp="0"> (model.xml, line 1)'
+
+
+@pytest.mark.parametrize("gravcomp", [1, 2])
+def test_body_that_does_not_fall_has_answers_that_say_so(tmp_path, gravcomp):
+    body = body_of(tmp_path, FREE.replace("<body", f'<body gravcomp="{gravcomp}"').format(LID))
+    found = {answer.quantity: answer for answer, _ in findings_of(body, *QUESTIONS)}
+    assert found["distance in 1 s"].in_force == pytest.approx((1 - gravcomp) * 0.5 * 9.81)
+    assert math.isnan(body.facts.rest_depth)
+
+
+def test_sleep_is_a_setting_with_a_remedy(tmp_path):
+    flag = '<option sleep_tolerance="0.6"><flag sleep="enable"/></option>'
+    body = body_of(tmp_path, FREE.format(LID), head=flag)
+    found = next(found for _, found in findings_of(body, fall))
+    assert (found.kind, body.facts.settings[found.settings[0]].text) == ("setting", 'sleep="enable"')
+    assert found.remedies[0].value == pytest.approx(0.5 * 9.81, rel=3e-3)
+    assert 'sleep_tolerance="0"' in found.remedies[0].text

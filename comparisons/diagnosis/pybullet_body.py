@@ -16,7 +16,7 @@ import pybullet_data  # type: ignore[import-untyped]
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
 from dropspin.comparisons.diagnosis.parts import Part, Support, at_point
-from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Ignored, read_links
+from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Ignored, Link, read_links
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.comparisons.diagnosis.urdf_file import UrdfFile, package_remedy
@@ -50,6 +50,7 @@ CALLS = {
     "own restitution": "changeDynamics(body, -1, restitution={:g})",
 }
 """What to call for changes of settings."""
+OF_EVERY_LINK = "for link in range(-1, getNumJoints(body)): changeDynamics(body, link, restitution={:g})"
 WRITTEN = (
     ("lateral_friction", "value", "friction"),
     ("restitution", "value", "restitution"),
@@ -107,7 +108,7 @@ class PyBulletBody(LooseBody):
         self.facts = self._facts(centre, own)
         self.causes = {"impact": ("contactERP",) if "stiffness" not in self.facts.settings else ("stiffness",)}
         self.remedies = {"damping": {"damping": 0.0}, "inertia": {"inertia": "file"}, "contactERP": {"contactERP": 0.0}}
-        if first.restitution > 0.0:
+        if any(link.restitution > 0.0 for link in self._touching):
             self.remedies["restitution"] = {"restitution": 1.0}
 
     def changed(self, changes: Changes) -> LooseBody:
@@ -115,6 +116,8 @@ class PyBulletBody(LooseBody):
 
     def patch(self, changes: Changes, dt: float) -> str:
         calls = [CALLS[name].format(value) for name, value in changes.items()]
+        if len(self._links) > 1 and "own restitution" in changes:
+            calls[list(changes).index("own restitution")] = OF_EVERY_LINK.format(changes["own restitution"])
         return ", ".join([*calls, *([f"setTimeStep({dt:g})"] if dt != STEP else [])])
 
     def for_restitution(self, restitution: float, dt: float) -> Changes:
@@ -167,10 +170,13 @@ class PyBulletBody(LooseBody):
         mass, squares = float(self._masses.sum()), np.sum(self._masses * np.sum(self._arms**2, axis=1))
         kappa = 0.0 if "damping" in self._changes else DAMPING
         plane = server().getDynamicsInfo(self._plane, -1)
-        parts = [part for link in self._links for part in link.parts(self._model, centre)]
-        written = self._links[0].written
-        touching = next((link for link in self._links if link.geometry), self._links[0])
-        margin = MARGIN if parts and _bottom(parts).shape.shape == "mesh" else 0.0
+        owned = [(link, part) for link in self._links for part in link.parts(self._model, centre)]
+        parts, written = [part for _, part in owned], self._links[0].written
+        lowest = min((_height(part) for part in parts), default=0.0)
+        self._touching = touching = [link for link, part in owned if _height(part) <= lowest + SLOP] or self._links[:1]
+        margin = MARGIN if any(_height(part) == lowest and part.shape.shape == "mesh" for part in parts) else 0.0
+        frictions, restitutions = {link.dynamics[1] for link in touching}, {(link.restitution, link.dynamics[9]) for link in touching}
+        is_hard = all(link.dynamics[9] < 0.0 for link in touching)  # a spring and damper have no restitution
         facts = Facts(
             name=self._name,
             engine="PyBullet",
@@ -185,13 +191,13 @@ class PyBulletBody(LooseBody):
             resistance=self._resistance(own, kappa),
             falls=Drag(kappa * mass, kappa * mass),
             surface=SURFACE if parts else "",
-            friction=touching.dynamics[1] * plane[1],
-            restitution=touching.restitution * plane[5] if touching.dynamics[9] < 0.0 else None,  # a spring and damper have none
+            friction=touching[0].dynamics[1] * plane[1] if len(frictions) == 1 else math.nan,
+            restitution=touching[0].restitution * plane[5] if is_hard and len(restitutions) == 1 else None,
             margin=margin,
-            rolling=touching.dynamics[6] > 0.0,
-            rest_depth=SLOP - margin if touching.dynamics[9] < 0.0 else math.nan,
+            rolling=any(link.dynamics[6] > 0.0 for link in touching),
+            rest_depth=SLOP - margin if is_hard else math.nan,
             written=None if written is None or len(self._links) > 1 else MassProperties(mass, np.zeros(3), written),
-            settings=self._settings(),
+            settings=self._settings(touching[0]),
             ignored=self._ignored(plane[5]),
             unmodelled=["joints"] if len(self._model.heads) > 1 else [],
         )
@@ -217,10 +223,11 @@ class PyBulletBody(LooseBody):
 
         return resistance
 
-    def _settings(self) -> dict[str, Setting]:
-        """The settings that matter, in the words of the file or as PyBullet's defaults."""
+    def _settings(self, touching: Link) -> dict[str, Setting]:
+        """The settings that matter, those of contacts of a link that touches, in the words of the file or as PyBullet's defaults."""
         link = self._model.links[self._name]
-        written = {name: at for tag, attribute, name in WRITTEN for one in link.every(tag) if (at := one.setting(attribute))}
+        owned = [(link if name in ("inertia", "mass") else touching.element, tag, at, name) for tag, at, name in WRITTEN]
+        written = {name: found for owner, tag, at, name in owned for one in owner.every(tag) if (found := one.setting(at))}
         for inertial in link.every("inertial"):
             written["centre"] = next((one.words for one in inertial.every("origin")), inertial.words)
         return {name: Setting(text) for name, text in DEFAULTS.items()} | written
@@ -235,7 +242,7 @@ class PyBulletBody(LooseBody):
         return found + [("joint", joint.words, "replaced by a fixed joint") for joint in joints]
 
 
-def _bottom(parts: Sequence[Part]) -> Part:
-    """The geometry that is the lowest one in the file's pose, with the margins of convex hulls."""
+def _height(part: Part) -> float:
+    """The height of a geometry's lowest point in the file's pose, with the margin of a convex hull, above the centre of mass [m]."""
     state = np.concatenate([np.zeros(3), Z_TO_Y, np.zeros(6)])[np.newaxis]
-    return min(parts, key=lambda part: float(Support([part]).lowest(state)[0]) - MARGIN * (part.shape.shape == "mesh"))
+    return float(Support([part]).lowest(state)[0]) - MARGIN * (part.shape.shape == "mesh")

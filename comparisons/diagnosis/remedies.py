@@ -71,7 +71,9 @@ def _why_unmeasured(facts: Facts) -> str:
         return facts.missed or "the body lands on no surface"
     if not facts.lands:
         return "gravity does not hold the body on a surface"
-    return f"the simulation leaves out {facts.left_out}" if facts.left_out else "the simulation broke down"
+    if facts.left_out:
+        return f"the simulation leaves out {facts.left_out}"
+    return "the geometries that touch the surface differ in it" if math.isnan(facts.friction) else "the simulation broke down"
 
 
 NO_TARGETS = Targets()

@@ -83,7 +83,11 @@ def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
         return [Paragraph(f"{body.name}: {body.breakdown.removesuffix('.')}.", style="bold", on_terminal=on_terminal)]
     others = f" (--on can choose {listed(body.others)})" if body.others else ""
     frictions = " and ".join(f"{one:g}" for one in (body.friction, body.friction_across) if not math.isnan(one))
-    lands = f"; lands on {body.surface}{others}, friction {frictions}" if body.surface else "; lands on no surface"
+    lands = (
+        f"; lands on {body.surface}{others}, friction {frictions or 'differs between geometries'}"
+        if body.surface
+        else "; lands on no surface"
+    )
     described = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg"
     head = f"{described}; {body.engine} {body.version}, time step {in_ms(body.dt)}{lands}."
     drawn = charts(body)

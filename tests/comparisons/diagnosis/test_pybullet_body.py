@@ -7,13 +7,14 @@ import pytest
 
 pytest.importorskip("pybullet", exc_type=ImportError)
 
+from support.urdf_files import BALL, BOX, body, joint, link, model, two_links
+
 from dropspin.comparisons.diagnosis import landing
 from dropspin.comparisons.diagnosis.answers import REBOUND
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble
 from dropspin.comparisons.diagnosis.friction import creep, roll, slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
-from dropspin.comparisons.diagnosis.pybullet_body import PyBulletModel
 from dropspin.comparisons.diagnosis.pybullet_server import server
 from dropspin.comparisons.diagnosis.remedies import answers_to
 from dropspin.scenarios import DropspinError
@@ -23,42 +24,12 @@ from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY
 
 LIVELY = f"{REBOUND} on a surface with restitution 1"
 DTS = (1.0 / 240.0, 1.0 / 480.0, 1.0 / 960.0)
-BOX, BALL = '<box size=".15 .05 .03"/>', '<sphere radius=".5"/>'
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-
-
-def link(geometry, mass="1", moments=(0.1, 0.1, 0.1), name="a", at="", extra="", on=""):
-    """A link with a collision geometry; `at` and `on` are the origins of its inertia and of its geometry."""
-    xx, yy, zz = moments
-    inertial = f'<inertial>{at}<mass value="{mass}"/><inertia ixx="{xx}" ixy="0" ixz="0" iyy="{yy}" iyz="0" izz="{zz}"/></inertial>'
-    return f'<link name="{name}">{extra}{inertial}<collision>{on}<geometry>{geometry}</geometry></collision></link>'
-
-
-def joint(kind, parent="a", child="b", origin=""):
-    ends = f'<parent link="{parent}"/><child link="{child}"/>'
-    return f'<joint name="{parent}{child}" type="{kind}">{ends}{origin}<axis xyz="0 0 1"/></joint>'
-
-
-def model(folder, *elements):
-    path = folder / "model.urdf"
-    path.write_text(f'<robot name="model">{"".join(elements)}</robot>', encoding="utf-8")
-    return PyBulletModel(path, "model.urdf")
-
-
-def body(folder, *elements, name="a"):
-    return model(folder, *elements).body(name, None)
 
 
 def named(answers, quantity, speed=None):
     [found] = [answer for answer in answers if answer.quantity == quantity and speed in (None, answer.speed)]
     return found
-
-
-def two_links(folder):
-    """A box and a ball that is fixed to it, with turned and shifted inertial frames."""
-    box = link('<box size=".1 .2 .3"/>', "2", at='<origin xyz=".02 .01 0" rpy=".3 .2 .1"/>')
-    ball = link('<sphere radius=".1"/>', name="b", at='<origin xyz="0 .05 0" rpy="0 .2 .1"/>')
-    return body(folder, box, ball, joint("fixed", origin='<origin xyz=".3 0 .1" rpy=".1 .5 .2"/>'))
 
 
 def test_the_default_damping_slows_fall_and_spin_as_the_closed_forms_say(tmp_path):

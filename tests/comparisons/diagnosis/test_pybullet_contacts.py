@@ -1,0 +1,40 @@
+"""Contacts of bodies of URDF files as PyBullet has them."""
+
+import math
+
+import pytest
+
+pytest.importorskip("pybullet", exc_type=ImportError)
+
+from support.urdf_files import BOX, body, joint, link, two_links
+
+from dropspin.comparisons.diagnosis.remedies import Targets
+
+STEP = 1.0 / 240.0
+
+
+def test_settings_of_contacts_are_those_of_the_links_that_touch(tmp_path):
+    def contact(mu, e):
+        return f'<contact><lateral_friction value="{mu}"/><restitution value="{e}"/></contact>'
+
+    def standing(x, *of_b):
+        parts = link(BOX, extra=contact(0.1, 0.9)), link(BOX, name="b", extra=contact(*of_b))
+        return body(tmp_path, *parts, joint("fixed", origin=f'<origin xyz="{x} 0 {-0.5 * (not x)}"/>'))
+
+    below, beside, alike = standing(0, 0.9, 0.0), standing(1, 0.9, 0.0), standing(1, 0.1, 0.9)
+    assert (below.facts.friction, below.facts.restitution, str(below.facts.settings["friction"])) == (
+        0.9,
+        0.0,
+        'value="0.9" (model.urdf, line 1)',
+    )
+    assert "restitution" not in below.remedies
+    assert math.isnan(beside.facts.friction)
+    assert beside.facts.restitution is None
+    assert alike.facts.friction == 0.1
+    [missed] = [answer.findings[0].detail for answer in Targets(friction=0.5).judged(beside, [])]
+    assert missed == "the target is 0.5, but the geometries that touch the surface differ in it"
+
+
+def test_restitution_of_several_links_is_called_for_each(tmp_path):
+    calls = two_links(tmp_path).patch({"own restitution": 0.3}, STEP)
+    assert calls == "for link in range(-1, getNumJoints(body)): changeDynamics(body, link, restitution=0.3)"

@@ -35,6 +35,7 @@ DEEP = 0.01
 """Depth, relative to the size, from which a body that starts inside a surface is said to."""
 LEVEL = 0.1
 """Angle between gravity and the normal of a surface up to which the surface is level [°]."""
+DEFAULT_CONTACT: Changes = {"solref": "0.02 1", "solimp": "0.9 0.95 0.001 0.5 2"}
 NO_FLUID: Changes = {"density": 0.0, "viscosity": 0.0}
 
 REMEDIES: Mapping[str, Changes] = {
@@ -49,6 +50,8 @@ REMEDIES: Mapping[str, Changes] = {
     "density": NO_FLUID,
     "viscosity": NO_FLUID,
     "sleep_tolerance": {"sleep_tolerance": 0.0},
+    "solref": DEFAULT_CONTACT,
+    "solimp": DEFAULT_CONTACT,
 }
 
 
@@ -73,7 +76,6 @@ class MuJoCoBody(LooseBody):
 
     def __init__(self, name: str, alone: MuJoCoAlone) -> None:
         self._name, self._alone, self._file, self.remedies = name, alone, alone.file, REMEDIES
-        self.causes = CAUSES
         self._model = alone.model(alone.file.model.opt.timestep, np.zeros(3), floor=False)
         found = mass_properties(self._model, self._at_rest, range(1, self._model.nbody))
         assert found is not None  # bodies without mass are left out
@@ -83,6 +85,8 @@ class MuJoCoBody(LooseBody):
         self._touching = {geom: alone.in_force_of(geom) for geom in self._lowest}
         self._text = BodyText(alone.file, alone.head, alone.surface, self._touching)
         self.facts = self._facts()
+        contact = tuple(name for name in DEFAULT_CONTACT if name in self.facts.settings and self.facts.settings[name].file)
+        self.causes = CAUSES | {question: (*CAUSES.get(question, ()), *contact) for question in ("slide", "roll")}
 
     def changed(self, changes: Changes) -> LooseBody:
         return MuJoCoBody(self._name, self._alone.changed(changes))

@@ -166,10 +166,12 @@ def test_friction_that_depends_on_the_direction(tmp_path):
 
 
 def test_short_slide_with_a_large_error_is_a_finding(tmp_path):
-    """A contact that bounces: the elliptic cone does not mend it, and is no remedy."""
+    """A contact that bounces: the elliptic cone does not mend it, and is no remedy; the default contact mends the slide along an axis."""
     body = body_of(tmp_path, FREE.format(BOX.replace("/>", ' solref="-1e4 -10"/>')))
     found = findings_of(body, slide)
-    assert {(answer.direction, finding.kind, finding.remedies) for answer, finding in found} == {("0°", "model", ()), ("45°", "model", ())}
+    [(along, of_contact), (diagonal, of_engine)] = found
+    assert (along.direction, of_contact.kind, of_contact.settings) == ("0°", "setting", ("solref",))
+    assert (diagonal.direction, of_engine.kind, of_engine.remedies) == ("45°", "model", ())
 
 
 def test_stiffness_and_the_direction_of_gravity_are_left_out_and_named(tmp_path):

@@ -1,0 +1,55 @@
+"""Remedies and words of settings of MJCF and URDF files in MuJoCo, as they are to be pasted."""
+
+import pytest
+from support.model_files import FREE, body_of, findings_of
+
+from dropspin.comparisons.diagnosis.friction import roll, slide
+from dropspin.comparisons.diagnosis.remedies import answers_to
+
+BOX = '<geom type="box" size=".1 .1 .1" mass="1" {}/>'
+
+
+def test_slide_on_a_soft_contact_is_due_to_the_contact(tmp_path):
+    """MuJoCo's own slides take 46 to 49 mm with any cone and step, and 12 to 13 mm with the default contact."""
+    body = body_of(tmp_path, FREE.format(BOX.format('solref=".2 1" priority="1"')))
+    found = [found for answer, found in findings_of(body, slide) if answer.direction == "0°"]
+    assert [(one.kind, one.settings) for one in found] == [("setting", ("solref",))]
+    assert found[0].remedies[0].value == pytest.approx(0.01274, rel=0.1)
+
+
+def test_ball_that_a_contact_slows_is_due_to_the_contact(tmp_path):
+    geom = '<geom name="g" size=".1" solimp=".5 .01 .01 .5 2" solref="-100 -5"/>'
+    [answer] = answers_to(roll, body_of(tmp_path, FREE.format(geom), 'cone="elliptic"'))
+    assert [found.kind for found in answer.findings] == ["setting"]
+
+
+def test_free_joint_keeps_its_name(tmp_path):
+    body = body_of(tmp_path, f'<body name="b"><joint name="root" type="free" damping=".02"/>{BOX.format("")}</body>')
+    assert body.patch(body.remedies["damping"], body.facts.dt).startswith('<freejoint name="root"/>')
+
+
+def test_option_of_a_urdf_goes_into_its_element(tmp_path):
+    mass = '<inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    link = f'<link name="b">{mass}<collision><geometry><box size="1 1 1"/></geometry></collision></link>'
+    text = f'<robot name="r"><mujoco><compiler discardvisual="false"/></mujoco>{link}</robot>'
+    body = body_of(tmp_path, text, file="model.urdf")
+    assert body.patch({"cone": "elliptic"}, body.facts.dt) == '<option cone="elliptic"/> within <mujoco> (model.urdf, line 1)'
+    bare = body_of(tmp_path, f'<robot name="r">{link}</robot>', file="model.urdf")
+    assert bare.patch({"cone": "elliptic"}, bare.facts.dt) == '<mujoco><option cone="elliptic"/></mujoco>'
+
+
+def test_second_number_of_five_frictions_is_sliding(tmp_path):
+    head = '<option o_friction=".2 .2 .005 .0001 .0001"><flag override="enable"/></option>'
+    assert [name for name, _, _ in body_of(tmp_path, FREE.format(BOX.format("")), head=head).facts.ignored] == []
+
+
+def test_mesh_that_is_counted_twice_is_the_bodys(tmp_path):
+    corners = "0 0 0 .1 0 0 0 .1 0 0 0 .1"
+    outline = [(0, 0), (0.2, 0), (0.2, 0.02), (0.02, 0.02), (0.02, 0.2), (0, 0.2)]
+    vertices = " ".join(f"{x} {y} {z}" for z in (-0.01, 0.01) for x, y in outline)
+    faces = [(0, n + 1, n) for n in range(1, 5)] + [(6, 6 + n, 7 + n) for n in range(1, 5)]
+    faces += [face for n in range(6) for m in [(n + 1) % 6] for face in ((n, m, m + 6), (n, m + 6, n + 6))]
+    face = " ".join(str(one) for face in faces for one in face)
+    head = f'<asset><mesh name="a" vertex="{corners}"/><mesh name="L" vertex="{vertices}" face="{face}"/></asset>'
+    [(_, setting, _)] = body_of(tmp_path, FREE.format('<geom type="mesh" mesh="L"/>'), head=head).facts.ignored
+    assert 'name="L"' in setting.text

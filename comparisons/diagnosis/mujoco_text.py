@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -137,10 +138,19 @@ class BodyText:
         found: list[Setting | str] = []
         if options:
             element = next(reversed(list(self._file.source.every("option"))), None)
-            bare = "<mujoco>{}</mujoco>" if self._file.is_urdf else "{}"
-            found.append(element.changed(options) if element else bare.format(f"{tagged('option', options)}/>"))
+            within = next(self._file.source.every("mujoco"), None)
+            bare = f"{tagged('option', options)}/>"
+            if element is None and within is not None:
+                bare += f" within {within.words}"
+            elif self._file.is_urdf:
+                bare = f"<mujoco>{bare}</mujoco>"
+            found.append(element.changed(options) if element else bare)
         if "damping" in others:
-            found += [Setting("<freejoint/>", joint.file, joint.line) for joint in self._joint] or ["<freejoint/>"]
+            free = [{name: value for name, value in joint.attributes.items() if name in ("name", "group")} for joint in self._joint]
+            free_texts = [f"{tagged('freejoint', kept)}/>" for kept in free]
+            found += [Setting(text, joint.file, joint.line) for text, joint in zip(free_texts, self._joint, strict=True)] or [
+                "<freejoint/>"
+            ]
         elif of_joint := {name: value for name, value in others.items() if name in OF_JOINT}:
             found += [joint.changed(of_joint) for joint in self._joint]
         if "gravcomp" in others:
@@ -202,6 +212,7 @@ class BodyText:
         """A coefficient of friction that the file has; 0 if it has none in this place."""
         written = self.settings.get("friction")
         numbers = written.text.partition('"')[2].strip('"').split() if written else []
+        place += len(numbers) == 5  # the coefficients of a pair, two of them sliding
         return float(numbers[place]) if len(numbers) > place else 0.0
 
     def _miscounted(self) -> Iterator[tuple[str, Setting, str]]:
@@ -211,7 +222,14 @@ class BodyText:
         group = self._file.group(self._head)
         has, exact = (mass_properties(*compiled, group) for compiled in ((self._file.model, self._file.data), self._file.exact))
         if has is not None and exact is not None and abs(has.mass - exact.mass) > NOTEWORTHY * exact.mass:
-            meshes = list(self._file.source.every("mesh"))
+            model = self._file.model
+            used = {
+                mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MESH, model.geom_dataid[geom])
+                for geom in np.flatnonzero(np.isin(model.geom_bodyid, group))
+                if model.geom_dataid[geom] >= 0
+            }
+            every = list(self._file.source.every("mesh"))
+            meshes = [mesh for mesh in every if mesh.attributes.get("name", Path(mesh.attributes.get("file", "")).stem) in used]
             made = f'counted as {has.mass:.4g} kg by default; its volume has {exact.mass:.4g} kg, which inertia="exact" gives'
             yield "mesh", meshes[0].words if meshes else Setting("a mesh"), made
 

@@ -336,11 +336,12 @@ def dropspin_model(pytestconfig: pytest.Config, tmp_path: Path) -> Callable[...,
     def diagnose(file: str | os.PathLike[str], *options: str, allowed: Iterable[str] = ()) -> list[Row]:
         __tracebackhide__ = True
         runs, command = pytestconfig.stash[RUNS], [os.fspath(file), *options]
-        done = runs.dropspin("diagnose", *command, "-o", str(tmp_path / "diagnosis"), "--json")
+        done = runs.dropspin("diagnose", "-o", str(tmp_path / "diagnosis"), "--json", *command)
         if done.returncode not in (0, 1):
             pytest.fail(_error(done), pytrace=False)
         rows: list[Row] = json.loads(done.stdout)
-        findings = [row for row in rows if row["finding"] and row["question"] not in set(allowed)]
+        names = {allowed} if isinstance(allowed, str) else set(allowed)
+        findings = [row for row in rows if row["finding"] and row["question"] not in names]
         if findings:
             lines = [f"{row['body']}, {row['finding']}: {row['question']}, {row['quantity']}: {row['settings']}" for row in findings]
             pytest.fail("\n".join([*lines, f"Reproduce: {shlex.join([NAME, 'diagnose', *command])}"]), pytrace=False)

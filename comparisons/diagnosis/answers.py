@@ -49,6 +49,7 @@ class Finding(NamedTuple):
         settings: The names of the settings that cause the finding.
         remedies: The changes that remove the finding.
         detail: Part of a sentence that explains the finding.
+        tried: The names of settings that were each changed, and none of which removes an error of the engine.
         shares: If several settings act, the share of each in the effect; settings that act only together have one share, as `a, b`.
     """
 
@@ -56,6 +57,7 @@ class Finding(NamedTuple):
     settings: tuple[str, ...] = ()
     remedies: tuple[Remedy, ...] = ()
     detail: str = ""
+    tried: tuple[str, ...] = ()
     shares: tuple[tuple[str, float], ...] = ()
 
     @property
@@ -125,7 +127,8 @@ def judged(
     is_acting = {"damping": any(body.facts.falls), "armature": body.facts.armature, "gravcomp": body.facts.lifted}
     acting = tuple(name for name in acting if is_acting[name])
     if unknown:
-        differs = bool(abs(values[0] - free) > NOTEWORTHY * (100.0 if answer.unit == "%" else abs(free)))
+        scale = 100.0 if answer.unit == "%" else abs(free) if math.isfinite(free) else 0.0
+        differs = bool(abs(values[0] - free) > NOTEWORTHY * scale)
         return replace(answer, measured=values[0], findings=(Finding("setting", (*unknown, *acting, *causes)),) * differs)
     scale = 100.0 if answer.unit == "%" else max(abs(exact[0]), 1e-300)
     errors, limit = [value - truth for value, truth in zip(values, exact, strict=True)], math.nan

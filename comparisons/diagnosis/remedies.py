@@ -15,6 +15,8 @@ from dropspin.comparisons.running.ablation import shares
 HALVINGS = (1.0, 0.5, 0.25)
 SAFE = 0.85
 """Factor on the time step at which an error of first order would be as large as a finding."""
+SHORTEST = 0.01
+"""The shortest time step that is tried, relative to that of the file: nobody would run a hundred times as many steps."""
 Question = Callable[[LooseBody, Sequence[float]], list[Answer]]
 """A function of a body and of time steps, of which the first is judged."""
 
@@ -134,6 +136,9 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
             if not any(one.is_error == finding.is_error or body.facts.unknown for one in other.findings):
                 found[settings] = Remedy(body.patch(changes, step), other.measured, other.unit, *body.elsewhere(step, changes))
                 changed = changed or {*changes, *["timestep"] * (step != body.facts.dt)}
+    if not found and finding.is_error:
+        is_step = finding.kind == "time step"
+        return finding._replace(settings=("timestep",)) if is_step else finding._replace(settings=(), tried=finding.settings)
     if not found:
         return finding
     kind: Kind = "setting" if finding.kind == "model" and () not in found else finding.kind
@@ -153,7 +158,7 @@ def _tries(body: LooseBody, answer: Answer, finding: Finding) -> Iterator[tuple[
     if "timestep" in finding.settings:
         scale = 100.0 if answer.unit == "%" else abs(answer.in_force) or 1.0
         excess = math.inf if answer.question == "rest" else abs(answer.measured - answer.in_force) / scale / NOTEWORTHY
-        yield (), _rounded(dt * (SAFE / excess if 1.0 < excess < math.inf else 0.25))
+        yield (), _rounded(dt * (max(SAFE / excess, SHORTEST) if 1.0 < excess < math.inf else 0.25))
     together = tuple(name for name in known if name not in body.causes.get(answer.question, ()))
     if len(together) > 1 and not finding.is_error:
         yield together, dt

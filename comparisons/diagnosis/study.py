@@ -128,7 +128,7 @@ def diagnose(
         file: An MJCF or URDF file, or a mesh (OBJ, STL).
         engines: `mujoco` and `pybullet`, or one of them; by default, those that can read the file.
         bodies: The names of bodies; by default, all free bodies.
-        on: The name of the geometry on which the bodies land; by default, the first plane or box with which they collide.
+        on: The name of the geometry on which the bodies land; by default, the plane or box below them.
         loose: Whether to diagnose also links that move on joints, each without its joint.
         density: Density of a mesh [kg/m³].
         restitution: Target for the coefficient of restitution.
@@ -141,8 +141,12 @@ def diagnose(
         The values and findings for each body and engine.
 
     Raises:
-        DropspinError: The file is not a model, no engine can read it, or it has no body of a name in `bodies`.
+        DropspinError: The file is not a model, no engine can read it, it has no body of a name in `bodies`, or a target is impossible.
     """
+    if restitution is not None and not 0.0 <= restitution <= 1.0:
+        raise DropspinError(f"restitution: got {restitution!r}; a target is from 0 to 1.")
+    if friction is not None and not 0.0 < friction < math.inf:
+        raise DropspinError(f"friction: got {friction!r}; a target is positive.")
     given, path, wanted = str(file), Path(file), [bodies] if isinstance(bodies, str) else list(bodies)
     ending = path.suffix.lower()
     if ending not in READERS:
@@ -177,7 +181,8 @@ def diagnose(
                 if isinstance(found, BodyDiagnosis):
                     return found
                 declined = isinstance(found, DropspinError) or found.verdict == "declined"
-                return BodyDiagnosis(name, entry.label, breakdown=str(found), declined=declined)
+                longer = "; --time-limit gives it more" if isinstance(found, Breakdown) and found.verdict == "timed_out" else ""
+                return BodyDiagnosis(name, entry.label, breakdown=f"{found}{longer}", declined=declined)
 
             found = [*refusals, *results_in_parallel(pieces, of_body, crews, on_progress or ignore)]
             if all(body.declined for body in found):

@@ -73,7 +73,7 @@ def _finding_cells(body: BodyDiagnosis, answer: Answer, finding: Finding | None)
     if finding is None:
         return {"finding": "", "settings": "", "shares": "", "remedies": "", "reason": ""}
     remedies = "; ".join(_remedies((answer, finding)))
-    settings, shares = "; ".join(_settings(body, finding)), "; ".join(f"{name}: {share:.3g}" for name, share in finding.shares)
+    settings, shares = "; ".join(_settings(body, finding.settings)), "; ".join(f"{name}: {share:.3g}" for name, share in finding.shares)
     return {"finding": finding.kind, "settings": settings, "shares": shares, "remedies": remedies, "reason": finding.detail}
 
 
@@ -178,7 +178,9 @@ def sentences(body: BodyDiagnosis) -> list[str]:
         question, finding = same[0][0].question, same[0][1]
         stated = grouped(same, _statement).items()
         statements = "; ".join(f"{_together([answer for answer, _ in those])} {statement}" for statement, those in stated)
-        where = ", ".join(_settings(body, finding))
+        where = ", ".join(_settings(body, finding.settings))
+        if finding.tried:
+            where = f"not removed by a change of {' or '.join(_settings(body, finding.tried))}"
         sentence = f"{question.capitalize()}, {_kind(finding)}: {statements}" + (f": {where}." if where else ".")
         lines.append(" ".join([sentence, *_remedies(*same)]))
     return lines
@@ -187,7 +189,7 @@ def sentences(body: BodyDiagnosis) -> list[str]:
 def _shared(pair: tuple[Answer, Finding]) -> tuple[object, ...]:
     """The properties by which findings are grouped into one sentence."""
     answer, finding = pair
-    return answer.question, finding.kind, finding.settings, tuple(remedy.text for remedy in finding.remedies)
+    return answer.question, finding.kind, finding.settings, finding.tried, tuple(remedy.text for remedy in finding.remedies)
 
 
 def _together(answers: Sequence[Answer]) -> str:
@@ -239,9 +241,9 @@ def _statement(pair: tuple[Answer, Finding]) -> str:
     return f"is {measured}" + (f" instead of {wanted}" if wanted else "") + limit + shares
 
 
-def _settings(body: BodyDiagnosis, finding: Finding) -> list[str]:
+def _settings(body: BodyDiagnosis, names: Sequence[str]) -> list[str]:
     known = body.settings or {}
-    return [str(known[name]) for name in finding.settings if name in known]
+    return [str(known[name]) for name in names if name in known]
 
 
 def differences(bodies: Sequence[BodyDiagnosis]) -> Rows:

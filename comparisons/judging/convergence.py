@@ -1,8 +1,7 @@
 """Convergence over several time steps: the error budget of a metric, corrected by that of its components.
 
 The error at each step is the average over start phases of one flight; steps that do not resolve this flight have none. The flight in which
-the error is largest at the finest step counts, or a worse one. Of a metric with two signs, both are judged: one may vanish where the other
-remains.
+the error is largest at the finest step counts, or a worse one; of a metric with two signs, both do: one may vanish where the other remains.
 """
 
 import math
@@ -29,9 +28,7 @@ ARTEFACTS = frozenset({"energy_error_raw"})
 JUMPING = frozenset({"desync_rate"})
 """Metrics that change from flight to flight instead of with a power of the time step."""
 ADDED_STEPS = (2.0, 4.0)
-"""Time steps, relative to the coarsest, that are added if the requested ones do not decide whether an error vanishes; finer ones would cost
-more.
-"""
+"""Time steps, relative to the coarsest, that are added if the requested ones leave open whether an error vanishes; finer ones cost more."""
 STANDARD_DEVIATIONS = 0.5
 """Factor on a resolution: half of the range of four means over quarters of the phases is twice the standard deviation of their mean."""
 SATURATION = 0.9 * math.pi

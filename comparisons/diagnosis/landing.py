@@ -146,7 +146,8 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     floats = facts.margin > 0.0 and -depth > noteworthy
     of_depth = _of_error(facts, depth_error, abs(finest_depth - facts.rest_depth), noteworthy)
     if math.isinf(facts.rest_depth):
-        of_depth = (Finding("setting", _written(facts), detail="and grows without end: a contact without stiffness holds no body"),)
+        endless = "and grows without end: a contact without stiffness holds no body"
+        of_depth = (Finding("setting", facts.in_file(*OF_CONTACT), detail=endless),)
     of_depth = (Finding("setting", ("margin",)),) * floats + of_depth
     of_speed = _of_error(facts, moving, finest_speed, noteworthy)
     return [
@@ -165,13 +166,8 @@ def _of_error(facts: Facts, error: float, finest: float, noteworthy: float) -> t
         return ()
     if finest < 0.6 * error:
         return (Finding("time step", ("timestep",)),)
-    acting = (*facts.unknown, *_written(facts))
+    acting = (*facts.unknown, *facts.in_file(*OF_CONTACT))
     return (Finding("setting", acting) if acting else Finding("model", ("timestep",)),)
-
-
-def _written(facts: Facts) -> tuple[str, ...]:
-    """The settings of contacts that the file has."""
-    return tuple(name for name in OF_CONTACT if name in facts.settings and facts.settings[name].file)
 
 
 def _at_rest(body: LooseBody, dt: float) -> tuple[float, float, bool]:

@@ -115,6 +115,10 @@ class Facts:
         """The function from states to the heights of the body's lowest point, shape (n,) [m]."""
         return Support(self.colliding).lowest
 
+    def in_file(self, *names: str) -> tuple[str, ...]:
+        """Those of some settings that the file has."""
+        return tuple(name for name in names if name in self.settings and self.settings[name].file)
+
     @property
     def lands(self) -> bool:
         """Whether there is a surface that gravity holds the body on."""

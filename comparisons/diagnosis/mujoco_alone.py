@@ -16,8 +16,8 @@ from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of, overrides, plain
 from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, PLANE, MuJoCoFile, set_options
 from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, kind_of, mesh_of, quaternion, shape_of
-from dropspin.comparisons.diagnosis.mujoco_text import FRICTION
 from dropspin.comparisons.diagnosis.parts import VOLUMES
+from dropspin.comparisons.engines.mujoco_settings import OF_GEOM
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
 from dropspin.scenarios.state import UP, Array
@@ -194,7 +194,7 @@ class MuJoCoAlone:
             return None
         touching = self.in_force_of(*self.pairs)
         option = self.model(self.file.model.opt.timestep, np.zeros(3), floor=False).opt
-        friction = tuple(touching["friction"][list(FRICTION)].tolist())
+        friction = tuple(touching["friction"][OF_GEOM].tolist())
         names = ("solref", "solimp", "condim", "margin")
         settings = GeomSettings(friction=friction, **{name: plain(np.asarray(touching[name])) for name in names})
         is_safe = not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE

@@ -18,7 +18,9 @@ from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.diagnosis.parts import Part, Support, at_point
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.mujoco_model import contact
+from dropspin.comparisons.engines.mujoco_settings import CONTACT
 from dropspin.comparisons.engines.mujoco_simulation import from_world, full_state, quiet, to_world
+from dropspin.comparisons.engines.options import spelled
 from dropspin.scenarios.rotations import multiply, rotate
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.surfaces import Floor
@@ -35,7 +37,7 @@ DEEP = 0.01
 """Depth, relative to the size, from which a body that starts inside a surface is said to."""
 LEVEL = 0.1
 """Angle between gravity and the normal of a surface up to which the surface is level [°]."""
-DEFAULT_CONTACT: Changes = {"solref": "0.02 1", "solimp": "0.9 0.95 0.001 0.5 2"}
+DEFAULT_CONTACT: Changes = {name: spelled(CONTACT[name].default) for name in ("solref", "solimp")}
 NO_FLUID: Changes = {"density": 0.0, "viscosity": 0.0}
 
 REMEDIES: Mapping[str, Changes] = {
@@ -85,7 +87,7 @@ class MuJoCoBody(LooseBody):
         self._touching = {geom: alone.in_force_of(geom) for geom in self._lowest}
         self._text = BodyText(alone.file, alone.head, alone.surface, self._touching)
         self.facts = self._facts()
-        contact = tuple(name for name in DEFAULT_CONTACT if name in self.facts.settings and self.facts.settings[name].file)
+        contact = self.facts.in_file(*DEFAULT_CONTACT)
         self.causes = CAUSES | {question: (*CAUSES.get(question, ()), *contact) for question in ("slide", "roll")}
 
     def changed(self, changes: Changes) -> LooseBody:

@@ -17,12 +17,11 @@ from dropspin.comparisons.diagnosis.mujoco_elements import body_element, childre
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, MuJoCoFile
 from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
 from dropspin.comparisons.diagnosis.urdf_file import for_other_simulators
+from dropspin.comparisons.engines.mujoco_settings import OF_GEOM
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
 
 OF_JOINT = ("damping", "armature", "frictionloss")
-FRICTION = (0, 2, 3)
-"""The coefficients of a pair that a geometry has: sliding, torsional, rolling."""
 SAME = 1e-6
 """Relative difference up to which a moment of inertia is the one that was written."""
 IN_FORCE = {"lateral_friction": 1.0, "rolling_friction": 0.0, "spinning_friction": 0.0, "restitution": 0.0}
@@ -146,11 +145,7 @@ class BodyText:
                 bare = f"<mujoco>{bare}</mujoco>"
             found.append(element.changed(options) if element else bare)
         if "damping" in others:
-            free = [{name: value for name, value in joint.attributes.items() if name in ("name", "group")} for joint in self._joint]
-            free_texts = [f"{tagged('freejoint', kept)}/>" for kept in free]
-            found += [Setting(text, joint.file, joint.line) for text, joint in zip(free_texts, self._joint, strict=True)] or [
-                "<freejoint/>"
-            ]
+            found += [self._freed(joint) for joint in self._joint] or ["<freejoint/>"]
         elif of_joint := {name: value for name, value in others.items() if name in OF_JOINT}:
             found += [joint.changed(of_joint) for joint in self._joint]
         if "gravcomp" in others:
@@ -159,6 +154,11 @@ class BodyText:
             found += [pair.changed(contact) for pair in self._pairs] or self._contact_of_geoms(contact)
         return ", ".join(map(str, found)) or " ".join(f'{name}="{value}"' for name, value in others.items())
 
+    def _freed(self, joint: Element) -> Setting:
+        """A free joint in place of a joint, with what others may refer to it by."""
+        kept = {name: value for name, value in joint.attributes.items() if name in ("name", "group")}
+        return Setting(f"{tagged('freejoint', kept)}/>", joint.file, joint.line)
+
     def _contact_of_geoms(self, changes: Mapping[str, object]) -> list[Setting]:
         """The geometries with other settings of the contact: margins add, and of the others those of the larger priority count alone."""
         model = self._file.model
@@ -166,7 +166,7 @@ class BodyText:
             return [geom.changed({"margin": 0}) for geom in self._of_contact if mjcf_setting(geom, "margin") is not None]
         found = []
         for number, contact in self._contacts.items():
-            kept = {"friction": contact["friction"][list(FRICTION)], "condim": np.array([contact["condim"]])}
+            kept = {"friction": contact["friction"][OF_GEOM], "condim": np.array([contact["condim"]])}
             kept = {name: value for name, value in kept.items() if np.any(value != getattr(model, f"geom_{name}")[number])}
             texts = {name: " ".join(f"{one:g}" for one in value) for name, value in kept.items()}
             priority = 1 + model.geom_priority[[number, self._surface]].max()

@@ -115,9 +115,8 @@ class PyBulletBody(LooseBody):
         return PyBulletBody(self._model, self._name, {**self._changes, **changes})
 
     def patch(self, changes: Changes, dt: float) -> str:
-        calls = [CALLS[name].format(value) for name, value in changes.items()]
-        if len(self._links) > 1 and "own restitution" in changes:
-            calls[list(changes).index("own restitution")] = OF_EVERY_LINK.format(changes["own restitution"])
+        texts = CALLS if len(self._links) == 1 else CALLS | {"own restitution": OF_EVERY_LINK}
+        calls = [texts[name].format(value) for name, value in changes.items()]
         return ", ".join([*calls, *([f"setTimeStep({dt:g})"] if dt != STEP else [])])
 
     def for_restitution(self, restitution: float, dt: float) -> Changes:
@@ -172,9 +171,11 @@ class PyBulletBody(LooseBody):
         plane = server().getDynamicsInfo(self._plane, -1)
         owned = [(link, part) for link in self._links for part in link.parts(self._model, centre)]
         parts, written = [part for _, part in owned], self._links[0].written
-        lowest = min((_height(part) for part in parts), default=0.0)
-        self._touching = touching = [link for link, part in owned if _height(part) <= lowest + SLOP] or self._links[:1]
-        margin = MARGIN if any(_height(part) == lowest and part.shape.shape == "mesh" for part in parts) else 0.0
+        heights = [_height(part) for part in parts]
+        lowest = min(heights, default=0.0)
+        self._touching = [link for (link, _), height in zip(owned, heights, strict=True) if height <= lowest + SLOP] or self._links[:1]
+        touching, bottom = self._touching, [part for part, height in zip(parts, heights, strict=True) if height == lowest]
+        margin = MARGIN if any(part.shape.shape == "mesh" for part in bottom) else 0.0
         frictions, restitutions = {link.dynamics[1] for link in touching}, {(link.restitution, link.dynamics[9]) for link in touching}
         is_hard = all(link.dynamics[9] < 0.0 for link in touching)  # a spring and damper have no restitution
         facts = Facts(

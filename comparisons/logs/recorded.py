@@ -23,12 +23,16 @@ EXPLAINED = 0.4
 """Share of the difference from the rotation of a free body that another reading of the orientations leaves at most."""
 LEAST_LEFT = 0.5
 """Share of the white noise of the orientations that every reading leaves."""
+EQUALLY = 1.1
+"""Factor on what the best reading leaves, up to which others explain the rotation as well."""
+NEARLY = 0.9
+"""Share of the tosses that end on a face in one reading, over that in another, from which on rests do not tell the two apart."""
 MOST_ROTORS = 8
 """Flights whose rotation is tried in other readings."""
 MOST_NOISE, ALLOWED = 3.0, 0.1
 """Multiple of the noise of recorded rates, and share of their size, up to which they agree with the motion."""
-EXPLAINED_RATES = 0.3
-"""Share of the difference that another reading of the rates leaves at most."""
+UNTRACKED = 0.3
+"""White noise of the orientations [rad] from which on they show no rotation: of a body that turns by half a turn between two frames."""
 RESTS_NEAR = 0.04
 """Of the size of the body: how far above or below the floor it may rest, by errors of its own size and of tags."""
 DEGREE, BETTER = 5, 1.02
@@ -46,30 +50,48 @@ def _read_as(toss: Toss, header: Header, rolled: int, inverse: bool) -> Toss:
 
 
 def of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
-    """Of quaternions that another reading, or other axes of the body, explain: bodies then rest on faces, or turn as free bodies do."""
-    other, rolled = ("wxyz", -1) if log.header.quaternion == "xyzw" else ("xyzw", 1)
-    inverse = "body-to-world" if log.header.rotation == "world-to-body" else "world-to-body"
+    """Of quaternions that another reading, or other axes of the body, explain: bodies then turn as free bodies do, or rest on faces."""
     level, count = level_share(log)
     inertia = log.header.body.inertia_tensor
     is_ball = bool(np.allclose(inertia, inertia[0, 0] * np.eye(3)))  # a spin is constant then, in every reading
     turns = _restlessness([rotor.samples.values for rotor in flights.rotations])
     tried = flights.found[:MOST_ROTORS] if not is_ball else []
+    readings = []  # each with what it leaves of the difference from free bodies, and with the share of the tosses that end on a face
+    for cause, rolled, inverse in _readings(log.header):
+        read = replace(log, tosses=tuple(_read_as(toss, log.header, rolled, inverse) for toss in log.tosses))
+        some = [replace(flight, toss=_read_as(flight.toss, log.header, rolled, inverse)) for flight in tried]
+        left = _restlessness([rotation(flight, inertia).samples.values for flight in some]) if some else turns
+        readings.append((left, level_share(read)[0], cause))
     can_be_explained = bool(tried) and EXPLAINED * turns > LEAST_LEFT * flights.turning.noise.white
-    orders = list(orders_of_axes(log.header.body)) if can_be_explained else []
-    lefts = [_restlessness([rotation(flight, exchanged).samples.values for flight in tried]) for exchanged, _ in orders]
-    left = min(lefts, default=math.inf)
-    order, direction = {"quaternion": other}, {"rotation": inverse}
-    for roll, turned, keys in ((rolled, False, order), (0, True, direction), (rolled, True, order | direction)):
-        read = replace(log, tosses=tuple(_read_as(toss, log.header, roll, turned) for toss in log.tosses))
-        some = [replace(flight, toss=_read_as(flight.toss, log.header, roll, turned)) for flight in tried]
-        again = _restlessness([rotation(flight, inertia).samples.values for flight in some]) if some else turns
-        share, _ = level_share(read)
-        shown_at_rest = count >= 3 and level < 0.7 and share > 0.9 and again < 2.0 * turns
-        if shown_at_rest or (again < min(EXPLAINED * turns, left) and not share < 0.9 * level):
-            yield Finding("quaternion", level, share, causes=(Cause("reading of the quaternions", keys=keys),))
-            return
-    if left < EXPLAINED * turns:
-        yield Finding("body axes", turns, left, causes=(orders[lefts.index(left)][1],))
+    orders = [
+        (_restlessness([rotation(flight, exchanged).samples.values for flight in tried]), level, cause)
+        for exchanged, cause in (orders_of_axes(log.header.body) if can_be_explained else ())
+    ]
+    found = [one for one in (*readings, *orders) if one[0] < EXPLAINED * turns and not one[1] < NEARLY * level]
+    if not found and count >= 3 and level < 0.7:
+        found = [one for one in readings if one[1] > NEARLY and one[0] < 2.0 * turns]
+    if found:
+        least = min(left for left, _, _ in found)
+        left, share, _ = max((one for one in found if one[0] <= EQUALLY * least), key=lambda one: one[1])
+        causes: list[Cause] = []
+        for other, level_then, cause in found:
+            if other <= EQUALLY * least and not level_then < NEARLY * share and cause not in causes:
+                causes.append(cause)
+        are_read = any(cause.name != "body axes" for cause in causes)
+        kind, value, expected = ("quaternion", level, share) if are_read else ("body axes", turns, left)
+        yield Finding(kind, value, expected, causes=tuple(causes))
+    elif flights.turning.noise.white > UNTRACKED:
+        yield Finding("rotation", flights.turning.noise.white, 0.0)
+
+
+def _readings(header: Header) -> Iterator[tuple[Cause, int, bool]]:
+    """The other readings of the quaternions: the cause, by how many columns they are rolled, and whether they are inverted."""
+    other, rolled = ("wxyz", -1) if header.quaternion == "xyzw" else ("xyzw", 1)
+    order = {"quaternion": other}
+    direction = {"rotation": "body-to-world" if header.rotation == "world-to-body" else "world-to-body"}
+    yield Cause("order of the quaternions", keys=order), rolled, False
+    yield Cause("direction of the quaternions", keys=direction), 0, True
+    yield Cause("order and direction of the quaternions", keys=order | direction), rolled, True
 
 
 def orders_of_axes(body: Body) -> Iterator[tuple[Array, Cause]]:
@@ -97,11 +119,10 @@ def of_rates(flights: Flights) -> Iterator[Finding]:
     rated = [pair for pair in each if pair[0].toss.angular_velocity is not None or pair[0].toss.velocity is not None]
     spun = [(flight, flight.toss.angular_velocity, rotor(flight.t)[1]) for flight, rotor in rated]
     frame = Cause("spin frame", keys={"spin_frame": "body" if in_world else "world"})
-    degrees = Cause("degrees", 180.0 / math.pi - 1.0)
-    yield from _of_column("spin", spun, flights.turning.noise.white, (frame, Cause("sign of the spin")), degrees)
+    if flights.turning.noise.white < UNTRACKED:
+        yield from _of_column("spin", spun, flights.turning.noise.white, frame)
     moved = [(flight, flight.toss.velocity, _velocities(flight, rates, flights.log.header)) for flight, _, rates in spun]
-    causes = Cause("velocity frame"), Cause("sign of the velocity")
-    yield from _of_column("velocity", moved, flights.moving.noise.white, causes)
+    yield from _of_column("velocity", moved, flights.moving.noise.white, Cause("velocity frame"))
 
 
 def _velocities(flight: Flight, spins: Array, header: Header) -> Array:
@@ -113,17 +134,14 @@ def _velocities(flight: Flight, spins: Array, header: Header) -> Array:
     return min(centre, centre + cross(spins, arms), key=lambda exact: float(np.median(length(given - exact))))
 
 
-def _of_column(
-    kind: str, columns: Sequence[tuple[Flight, Array | None, Array]], white: float, causes: tuple[Cause, Cause], unit: Cause | None = None
-) -> Iterator[Finding]:
-    """Of recorded rates that differ from those of the motion.
+def _of_column(kind: str, columns: Sequence[tuple[Flight, Array | None, Array]], white: float, frame: Cause) -> Iterator[Finding]:
+    """Of recorded rates that differ from those of the motion: a finding for each of the fewest causes with which they agree.
 
     Args:
         kind: The kind of the finding.
         columns: Each flight with its recorded rates, if any, and with those of the motion in its rows.
         white: The white noise of the poses.
-        causes: That the rates are in the other frame, and that they are reversed.
-        unit: That they are in the unit that is usual beside the right one; by default, any factor is one of units.
+        frame: The cause that the rates are in the other frame.
     """
     known = [(flight, given[flight.rows], exact, given[flight.first : flight.end]) for flight, given, exact in columns if given is not None]
     if not known:
@@ -131,21 +149,27 @@ def _of_column(
     given, exact = (np.concatenate([row[field] for row in known]) for field in (1, 2))
     turned = np.concatenate([flight.toss.orientation[flight.rows] for flight, *_ in known])
     # Second differences of white noise are √6 times as large, and those of a motion are small.
-    noise = float(np.median(np.concatenate([length(np.diff(rates, n=2, axis=0)) for *_, rates in known]))) / math.sqrt(6.0)
-    noise += white / float(np.median([flight.duration for flight, *_ in known]))
+    rough = float(np.median(np.concatenate([length(np.diff(rates, n=2, axis=0)) for *_, rates in known]))) / math.sqrt(6.0)
+    noise = white / float(np.median([flight.duration for flight, *_ in known]))
     size = float(np.median(length(exact))) or float(np.median(length(given)))
 
-    def error(values: Array) -> float:
-        return float(np.median(length(values - exact))) / size
+    def explained(rates: Array, factor: float) -> bool:
+        """Whether the rates over a factor agree with those of the motion."""
+        return float(np.median(length(rates / factor - exact))) <= max(MOST_NOISE * (rough / abs(factor) + noise), ALLOWED * size)
 
-    if float(np.median(length(given - exact))) <= max(MOST_NOISE * noise, ALLOWED * size):
+    if explained(given, 1.0):
         return
-    factor = 1.0 + unit.share if unit else float(np.sum(given * exact) / np.sum(exact**2))
-    unit, (frame, reversed_) = unit or Cause("unit of the velocity", factor - 1.0), causes
-    readings = [(frame, rotate(turned, given)), (frame, unrotate(turned, given)), (reversed_, -given)]
-    readings.append((unit, given / factor if factor > 0.0 else given))
-    cause, best = min(readings, key=lambda reading: error(reading[1]))
-    yield Finding(kind, error(given), 0.0, causes=(cause,) if error(best) < EXPLAINED_RATES * error(given) else ())
+    found: list[tuple[Cause | None, ...]] = []
+    for in_frame, rates in (((), given), ((frame,), rotate(turned, given)), ((frame,), unrotate(turned, given))):
+        factor = float(np.sum(rates * exact) / np.sum(exact**2))
+        is_scaled = abs(abs(factor) - 1.0) > ALLOWED
+        if factor != 0.0 and explained(rates, factor):
+            in_degrees = kind == "spin" and abs(math.radians(abs(factor)) - 1.0) < ALLOWED
+            unit = Cause("degrees" if in_degrees else f"unit of the {kind}", abs(factor) - 1.0)
+            found.append((*in_frame, *[Cause(f"sign of the {kind}")] * (factor < 0.0), *[unit] * is_scaled))
+    difference = float(np.median(length(given - exact))) / size
+    for cause in min(found, key=len, default=(None,)):
+        yield Finding(kind, difference, 0.0, causes=() if cause is None else (cause,))
 
 
 def _residual(flights: Flights, *, equal_steps: bool) -> float:

@@ -16,8 +16,9 @@ KINDS = {
     "inertia, x": "I_x / I_y is {value:.3g} times the ratio in the header",
     "inertia, z": "I_z / I_y is {value:.3g} times the ratio in the header",
     "drag": "the speed decays at a rate of {value:.2g} 1/s",
-    "quaternion": "the quaternions have another order than the header says, or describe the inverse rotation",
+    "quaternion": "the body does not turn, or rest, as that of the header does",
     "body axes": "the body does not turn as that of the header does",
+    "rotation": "the orientations differ by {value:.1f} rad from those of a free body",
     "spin": "the recorded angular velocity differs by {percent:.0f} % from that of the quaternions",
     "velocity": "the recorded velocity differs by {percent:.0f} % from that of the positions",
     "floor": "bodies at rest are {mm_off:.4g} mm {side} the floor of the header",
@@ -31,6 +32,9 @@ KINDS = {
     "rate": "the times have {value:.5g} frames per second, the header says {expected:.5g}",
 }
 CAUSES = {
+    "order of the quaternions": "the quaternions have another order than the header says",
+    "direction of the quaternions": "the quaternions describe the inverse rotation",
+    "order and direction of the quaternions": "the quaternions have another order than the header says, and describe the inverse rotation",
     "length unit": "lengths are in {key}",
     "time unit": "times are in {key}",
     "length scale": "lengths are {ratio:.4g} times the true ones",
@@ -47,6 +51,7 @@ CAUSES = {
     "sign of the spin": "its sign is reversed",
     "velocity frame": "it is in the body frame",
     "sign of the velocity": "its sign is reversed",
+    "unit of the spin": "it is {ratio:.4g} times the true one",
     "unit of the velocity": "it is {ratio:.4g} times the true one",
     "held": "the body is held until then",
     "earlier impact": "the flight follows an impact",
@@ -60,6 +65,7 @@ LESS_OR_MORE = {
 }
 """The words for lengths and rates that are wrong by at most a half, too small and too large."""
 REMEDIES = {
+    "rotation": "record more frames per second, or spin the body less: it has to turn by much less than half a turn between two frames",
     "drag": "engines simulate no air; shorter falls or a denser body reduce the effect of drag",
     "no flight": "begin the recording when the body is released",
     "frame dropped": "give the exact time of each frame in a column t",
@@ -71,6 +77,7 @@ REMEDIES = {
     "push": "film without wind and without strings on the body",
     "body axes": "record orientations of axes that the shape has in dropspin: y along a capsule or a cylinder",
     "degrees": "multiply wx, wy, wz by π/180",
+    "unit of the spin": "divide wx, wy, wz by {ratio:.4g}",
     "sign of the spin": "change the sign of wx, wy, wz",
     "velocity frame": "rotate vx, vy, vz into the frame of the positions",
     "sign of the velocity": "change the sign of vx, vy, vz",
@@ -86,6 +93,7 @@ SHOWN_BY = {
     "quaternion": "{percent:.0f} % of the tosses end at rest on a face as recorded, {expected_percent:.0f} % with the remedy",
 }
 SEPARATED_BY = {
+    "quaternion": "look up which quaternions the software writes that made the file",
     "unit": "measure the height at rest on a known face, or a length in the recording",
     "scale": "measure the height at rest on a known face, or the rate of the camera with a clock in the picture",
     "centre of mass": "measure the heights at rest on opposite faces",
@@ -95,7 +103,7 @@ SEPARATED_BY = {
 def sentence(finding: Finding) -> str:
     """The error, its possible causes, the evidence for them or how to distinguish them, and the remedy."""
     values, several = _values(finding), len(finding.causes) > 1
-    is_shown = math.isfinite(finding.value if finding.kind == "quaternion" else finding.rests)
+    is_shown = finding.value < finding.expected if finding.kind == "quaternion" else math.isfinite(finding.rests)
     by = SEPARATED_BY if several else SHOWN_BY if is_shown else {}
     parts = {
         ": either " if several else ": ": ", or ".join(filter(None, map(_words, finding.causes))),
@@ -146,7 +154,7 @@ def _remedy(cause: Cause, values: dict[str, Any]) -> str:
     if not cause.keys:
         return REMEDIES.get(cause.name, "").format_map(values | {"ratio": 1.0 + cause.share})
     names = {key: f"[body] {key.removeprefix('body.')}" if key.startswith("body.") else key for key in cause.keys}
-    return ", ".join(f"{name} = {_toml(cause.keys[key])}" for key, name in names.items())
+    return " and ".join(f"{name} = {_toml(cause.keys[key])}" for key, name in names.items())
 
 
 def _toml(value: Any) -> str:

@@ -1,6 +1,6 @@
 """Faults planted into sound recordings: each is named, as alternatives where the motion cannot tell them apart."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,12 +10,14 @@ from support.tosses import BRICK, CUBE, made, turned
 
 from dropspin.comparisons.logs import check as checks
 from dropspin.comparisons.logs.check import CENTRES, RATIOS, Check, log_check
+from dropspin.comparisons.logs.flight import Flight
 from dropspin.comparisons.logs.flights import flights_of
 from dropspin.comparisons.logs.log import Finding, Header, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression
-from dropspin.comparisons.logs.recorded import of_frames
+from dropspin.comparisons.logs.recorded import of_frames, of_rates
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.validation import validated
 
 NOISE = (2e-4, 2e-3)
@@ -91,6 +93,41 @@ def test_another_upward_axis_is_named() -> None:
 def test_another_reading_of_quaternions_is_named_by_the_motion_of_a_brick(change: Callable[[Toss], Any], keys: dict[str, str]) -> None:
     found = only(log_check(changed(sound(count=8, body=BRICK), orientation=change)))
     assert (found.kind, cure(found)) == ("quaternion", keys)
+
+
+def with_rests(log: Log) -> Log:
+    """The recording whose tosses end at rest, each on a face, turned by any angle about the vertical."""
+    random, rows = np.random.default_rng(5), 12
+
+    def still(toss: Toss) -> np.ndarray:
+        face, yaw = ([0.0, 0.0, 0.0, 1.0], [0.5, 0.5, 0.5, 0.5], ON_SIDE)[int(toss.name) % 3], random.uniform(0.0, np.pi)
+        rest = multiply(np.array([0.0, np.sin(yaw), 0.0, np.cos(yaw)]), np.array(face))
+        return np.concatenate([toss.orientation, turned(random.normal(size=(rows, 3)) * NOISE[1], np.tile(rest, (rows, 1)))])
+
+    return changed(
+        log,
+        t=lambda toss: np.arange(len(toss) + rows) / 148.0,
+        position=lambda toss: np.concatenate([toss.position, [0.0, 0.05, 0.0] + random.normal(size=(rows, 3)) * NOISE[0]]),
+        orientation=still,
+    )
+
+
+ORDER, DIRECTION = {"quaternion": "wxyz"}, {"rotation": "world-to-body"}
+
+
+@pytest.mark.parametrize(
+    ("change", "causes"),
+    [
+        (conjugate, [DIRECTION]),
+        (lambda orientation: np.roll(conjugate(orientation), 1, axis=1), [ORDER | DIRECTION, {"body.half_extents": [0.07, 0.05, 0.04]}]),
+    ],
+)
+def test_the_reading_that_fits_best_is_named_and_all_that_fit_as_well(change: Callable[..., Any], causes: list[dict[str, Any]]) -> None:
+    # Rows of quaternions that are the inverse ones lie on faces in the order wxyz too; read [w, x, y, z], inverse ones exchange two edges.
+    body = {"shape": "box", "half_extents": [0.04, 0.05, 0.07], "mass": 0.4}
+    log = with_rests(sound(count=6, body=body))
+    found = only(log_check(changed(log, orientation=lambda toss: change(toss.orientation))))
+    assert (found.kind, [cause.keys for cause in found.causes]) == ("quaternion", causes)
 
 
 def with_body(log: Log, body: dict[str, Any]) -> Log:
@@ -176,15 +213,6 @@ def test_uneven_times_are_a_finding_unless_the_body_moved_at_these_times() -> No
 
     assert "jitter" in kinds(changed(irregular, t=lambda toss: uneven[toss.name]))
     assert "jitter" not in kinds(changed(irregular, t=lambda toss: uneven[toss.name], position=moved))
-
-
-@pytest.mark.extended
-def test_a_spin_in_the_body_frame_is_named() -> None:
-    with_spin = changed(sound(), angular_velocity=lambda toss: np.zeros((len(toss), 3)))
-    check = log_check(with_spin)
-    rotors = {rotor.flight.toss.name: rotor for rotor in check.flights.rotations}
-    given = changed(with_spin, angular_velocity=lambda toss: unrotate(toss.orientation, rotors[toss.name](toss.t)[1]))
-    assert cure(only(log_check(given))) == {"spin_frame": "body"}
 
 
 @pytest.mark.extended
@@ -284,6 +312,35 @@ def test_velocities_that_are_not_those_of_the_positions_are_named(change: Callab
     assert log_check(log).findings == ()
     found = only(log_check(changed(log, velocity=change)))
     assert (found.kind, [one.name for one in found.causes]) == ("velocity", [cause])
+
+
+def test_each_error_of_recorded_spins_is_named_and_no_unit_that_does_not_explain_them() -> None:
+    log = with_rates(sound(count=4, spin=10.0))
+    check = log_check(log)
+    assert check.findings == ()
+
+    def causes(change: Callable[[Array], Array]) -> list[tuple[str, ...]]:
+        spun = changed(log, angular_velocity=lambda toss: change(unrotate(toss.orientation, toss.angular_velocity)))
+        found = list(of_rates(replace(check.flights, log=spun, flights=tuple(_moved(check.flights.flights, spun)))))
+        assert {finding.kind for finding in found} == {"spin"}
+        assert [dict(cause.keys) for cause in found[0].causes] in ([], [{"spin_frame": "body"}])
+        return [tuple(cause.name for cause in finding.causes) for finding in found]
+
+    assert causes(np.degrees) == [("spin frame",), ("degrees",)]
+    assert causes(lambda spin: -1e3 * spin) == [("spin frame",), ("sign of the spin",), ("unit of the spin",)]
+    assert causes(lambda spin: 10.0 * spin[:, [1, 2, 0]]) == [()]
+
+
+def _moved(flights: Sequence[Flight | None], log: Log) -> Iterator[Flight | None]:
+    """The flights with the columns of another recording."""
+    for flight, toss in zip(flights, log.tosses, strict=True):
+        yield flight and replace(flight, toss=toss)
+
+
+def test_orientations_of_a_body_that_turns_too_fast_for_the_frames_are_no_other_reading() -> None:
+    random = np.random.default_rng(6)
+    log = changed(with_rates(sound(count=4)), orientation=lambda toss: turned(1.5 * random.normal(size=(len(toss), 3)), toss.orientation))
+    assert [finding.kind for finding in log_check(log).findings] == ["rotation"]
 
 
 @pytest.mark.parametrize("spin", [0.0, 0.2])

@@ -36,9 +36,9 @@ RATE = Cause("rate", -0.0111, {"rate": 149.7})
             "= 74.",
         ),
         (
-            Finding("quaternion", 0.43, 1.0, causes=(Cause("reading of the quaternions", keys={"quaternion": "wxyz"}),)),
-            "The quaternions have another order than the header says, or describe the inverse rotation. Evidence: 43 % of the tosses end "
-            'at rest on a face as recorded, 100 % with the remedy. Remedy: quaternion = "wxyz".',
+            Finding("quaternion", 0.43, 1.0, causes=(Cause("order of the quaternions", keys={"quaternion": "wxyz"}),)),
+            "The body does not turn, or rest, as that of the header does: the quaternions have another order than the header says. "
+            'Evidence: 43 % of the tosses end at rest on a face as recorded, 100 % with the remedy. Remedy: quaternion = "wxyz".',
         ),
         (
             Finding("centre of mass", 0.0062, 0.0, causes=(Cause("centre of mass", keys={"body.center_of_mass": [0.0, 0.0, 0.0062]}),)),

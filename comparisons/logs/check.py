@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.logs.falling import ALARM, RATES, flights_in_any_units
+from dropspin.comparisons.logs.falling import ALARM, flights_in_any_units
 from dropspin.comparisons.logs.flight import (
     ACCELERATION,
     OFFSET,
@@ -142,9 +142,11 @@ def _of_units(flights: Flights) -> Iterator[Finding]:
         causes = [Cause("length unit", keys={"length_unit": unit}) for unit in lengths]
         times = [unit for unit, value in TIMES.items() if abs(ratio * (value / TIMES[header.time_unit]) ** -2 - 1.0) < UNIT]
         causes += [Cause("time unit", keys={"time_unit": unit}) for unit in times]
-        causes += [_rate_cause(flights.log, rate**2) for rate in RATES if abs(ratio / rate**2 - 1.0) < UNIT]
-        both = [_length_cause(header, ratio), _rate_cause(flights.log, ratio)]
-        yield Finding("unit", ratio * header.gravity, header.gravity, causes=tuple(causes or both))
+        at_rest = rests(flights.log).scale()[0]
+        by_length, by_time = abs(at_rest - ratio) < abs(at_rest - 1.0), abs(at_rest - ratio) > abs(at_rest - 1.0)
+        local = Cause("local gravity", keys={"gravity": float(f"{ratio * header.gravity:.4g}")})
+        others = _shown((_length_cause(header, ratio), by_length), (_rate_cause(flights.log, ratio), by_time), (local, by_time))
+        yield Finding("unit", ratio * header.gravity, header.gravity, causes=tuple(causes) or others, rests=at_rest)
 
 
 def _length_cause(header: Header, ratio: float) -> Cause:

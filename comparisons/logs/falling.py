@@ -1,11 +1,12 @@
-"""The flights of a recording whose units and axes may be wrong: most tosses fall with one acceleration, in whatever direction."""
+"""The flights of a recording whose units and axes may be wrong: tosses fall longest with one acceleration, in whatever direction."""
 
+import math
 from functools import cache
 from itertools import product
 
 import numpy as np
 
-from dropspin.comparisons.logs.flight import ACCELERATION, accelerations, is_near, noise_of, standard_error, window_size
+from dropspin.comparisons.logs.flight import ACCELERATION, accelerations, is_near, noise_of, runs, standard_error, window_size
 from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, flights_of, heights
 from dropspin.comparisons.logs.log import LENGTHS, TIMES, Log
 from dropspin.scenarios.errors import DropspinError
@@ -13,6 +14,10 @@ from dropspin.scenarios.state import Array
 
 ALARM = 1e-4
 """Probability of a finding where there is nothing, of each value."""
+ABOUT = 0.75
+"""Share of the frames of the longest falls from which on the header's acceleration is that of the tosses."""
+MOST_TOSSES, MOST_PIECES = 20, 200
+"""Tosses in which accelerations are tried, and pieces of these whose accelerations are."""
 RATES = (0.5, 2.0)
 """Rates over the true one that are tried."""
 
@@ -45,23 +50,30 @@ def _flies(flights: Flights) -> bool:
 
 
 def _acceleration(log: Log, down: Array) -> Array:
-    """The free acceleration: the header's, if most tosses fall with it, else that of other units and axes that most tosses fall with."""
+    """The free acceleration: the header's, if the tosses fall with it about as long as with any other, else that of the longest falls.
+
+    The others are those of other units and axes, and those of pieces of the tosses.
+    """
     noise, offset = noise_of(log), log.header.tracked_from_centre
+    tosses = log.tosses[:: math.ceil(len(log.tosses) / MOST_TOSSES)]
 
     @cache
     def pieces(number: int, size: int) -> Array:
-        return accelerations(log.tosses[number], size, offset)
+        return accelerations(tosses[number], size, offset)
 
     def falling(acceleration: Array) -> int:
-        sizes = [window_size(toss, noise, acceleration) for toss in log.tosses]
-        errors = [standard_error(toss, size, noise) for toss, size in zip(log.tosses, sizes, strict=True)]
-        near = (is_near(pieces(*of_toss), acceleration, error) for of_toss, error in zip(enumerate(sizes), errors, strict=True))
-        return sum(bool(of_toss.any()) for of_toss in near)
+        """The frames of the longest run of each toss, together."""
+        total = 0
+        for number, toss in enumerate(tosses):
+            size = window_size(toss, noise, acceleration)
+            near = is_near(pieces(number, size), acceleration, standard_error(toss, size, noise))
+            total += max((end - first + size - 1 for first, end in runs(near)), default=0)
+        return total
 
-    if 2 * falling(down) > len(log.tosses):
-        return down
     lengths, times = ({a / b for a, b in product(units.values(), repeat=2)} for units in (LENGTHS, TIMES))
     factors = lengths | {ratio**2 for ratio in (*times, *RATES)}
     candidates = [factor * sign * np.roll(down, turn) for factor in sorted(factors) for turn in range(3) for sign in (1.0, -1.0)]
-    candidates += [first for number, toss in enumerate(log.tosses) for first in pieces(number, window_size(toss, noise, down))[:1]]
-    return max([down, *candidates], key=falling)
+    some = np.concatenate([pieces(number, size)[::size] for number, size in enumerate(window_size(toss, noise, down) for toss in tosses)])
+    candidates += list(some[:: math.ceil(len(some) / MOST_PIECES) or 1])
+    best = max(candidates, key=falling)
+    return down if falling(down) > ABOUT * falling(best) else best

@@ -116,10 +116,15 @@ def falls(log: Log, acceleration: Array) -> list[Flight | None]:
 def _fall(toss: Toss, noise: float, offset: Array, acceleration: Array) -> Flight | None:
     size = window_size(toss, noise, acceleration)
     near = is_near(accelerations(toss, size, offset), acceleration, standard_error(toss, size, noise))
+    parts = [Flight(toss, first, end + size - 1) for first, end in runs(near)]
+    longest = max(map(len, parts), default=0)
+    return next((part for part in parts if 2 * len(part) > longest), None)
+
+
+def runs(near: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """The first piece and the one after the last of each run of pieces that are near."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
-    runs = [Flight(toss, int(first), int(end) + size - 1) for first, end in edges.reshape(-1, 2)]
-    longest = max(map(len, runs), default=0)
-    return next((run for run in runs if 2 * len(run) > longest), None)
+    return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
 
 
 def is_near(pieces: Array, acceleration: Array, error: float) -> NDArray[np.bool_]:

@@ -1,6 +1,7 @@
 """All flights of a recording: what they share, and the state at the end of each."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +21,9 @@ NEAR_FLOOR = 0.1
 """Height of the lowest point, over the size of the body, below which a frame may be one of a contact, which may be between two frames."""
 HIDDEN = 0.1
 """Component, along an axis, of a direction that flights do not show, from which on they do not show that axis."""
+
+SURELY, ROUNDS, LARGEST_STEP = 1e-3, 5, 0.7
+"""Probability with which ratios of inertia differ as much by noise, rounds of a fit of others, and largest logarithm of a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +132,21 @@ def flights_of(log: Log, acceleration: Array) -> Flights | None:
         flights = [None if flight is None else grown(flight, moving, next(weights)) for flight in flights]
     found = [flight for flight in flights if flight is not None]
     rotations = tuple(rotation(flight, log.header.body.inertia_tensor) for flight in found)
-    return Flights(
-        log, tuple(flights), regression(list(map(positions, found))), rotations, regression([rotor.samples for rotor in rotations])
-    )
+    return Flights(log, tuple(flights), regression(list(map(positions, found))), rotations, _turning(rotations))
+
+
+def _turning(rotations: Sequence[Rotation]) -> Regression:
+    """Ratios of inertia, by derivatives at those that the flights show, if these are not those of the rotors."""
+    turning, moved = regression([rotor.samples for rotor in rotations]), np.zeros(2)
+    for _ in range(ROUNDS):
+        is_off = np.abs(turning.values) > turning.half_widths(SURELY)
+        moved += np.where(is_off, np.clip(turning.values, -LARGEST_STEP, LARGEST_STEP), 0.0)
+        if not is_off.any():
+            break
+        stretched = np.exp(0.5 * np.array([moved[0], 0.0, moved[1]]))
+        inertia = rotations[0].inertia * np.outer(stretched, stretched)
+        turning = regression([rotation(rotor.flight, inertia).samples for rotor in rotations])
+    return replace(turning, values=turning.values + moved)
 
 
 def _above_floor(header: Header, flights: list[Flight | None]) -> list[Flight | None]:

@@ -39,7 +39,7 @@ CAUSES = {
     "time unit": "times are in {key}",
     "length scale": "lengths are {ratio:.4g} times the true ones",
     "rate": "the rate is {ratio:.4g} times the true one",
-    "local gravity": "the local gravity differs",
+    "local gravity": "gravity there differs from that of the header",
     "centre of mass": "the centre of mass is at {key} m",
     "tracked point": "the tracked point is at {key} m",
     "axes": "the axes are tilted",
@@ -88,13 +88,14 @@ REMEDIES = {
 }
 """The remedies of findings, and of causes that no key of the header removes."""
 SHOWN_BY = {
+    "unit": "heights at rest are {rests:.4g} times the expected ones",
     "scale": "heights at rest are {rests:.4g} times the expected ones",
     "centre of mass": "heights at rest on opposite faces differ by {rests_mm:.2g} mm",
     "quaternion": "{percent:.0f} % of the tosses end at rest on a face as recorded, {expected_percent:.0f} % with the remedy",
 }
 SEPARATED_BY = {
     "quaternion": "look up which quaternions the software writes that made the file",
-    "unit": "measure the height at rest on a known face, or a length in the recording",
+    "unit": "compare a length in the recording with the true one, and the rate with a clock in the picture",
     "scale": "measure the height at rest on a known face, or the rate of the camera with a clock in the picture",
     "centre of mass": "measure the heights at rest on opposite faces",
 }

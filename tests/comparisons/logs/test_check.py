@@ -215,6 +215,17 @@ def test_uneven_times_are_a_finding_unless_the_body_moved_at_these_times() -> No
     assert "jitter" not in kinds(changed(irregular, t=lambda toss: uneven[toss.name], position=moved))
 
 
+@pytest.mark.parametrize("faster", [0.5, 1.5])
+def test_a_rate_that_is_far_off_is_measured_and_told_from_lengths_by_the_heights_at_rest(faster: float) -> None:
+    # The true rate of the cube, by the lengths of its header, which are 2.2 % short: 148 / √0.978 = 149.7 frames per second.
+    cube = load_log("toss-cube")
+    some = changed(replace(cube, tosses=cube.tosses[:12], irregularities=()), t=lambda toss: toss.t / faster)
+    [found] = [finding for finding in log_check(some).findings if finding.kind == "unit"]
+    assert found.value == pytest.approx(9.594 * faster**2, rel=0.01)
+    assert [cause.name for cause in found.causes] == ["rate", "local gravity"]
+    assert found.causes[0].share == pytest.approx(0.989 * faster - 1.0, abs=0.01)
+
+
 @pytest.mark.extended
 def test_the_shipped_cube_has_short_lengths_and_an_eccentric_mass() -> None:
     # Intervals of an independent evaluation of the same tosses: gravity -9.623 to -9.579 m/s², centre of mass 4.4 to 6.7 mm along z.

@@ -32,8 +32,8 @@ RATE = Cause("rate", -0.0111, {"rate": 149.7})
         (
             Finding("unit", 39.2, 9.81, causes=(Cause("length scale", 3.0, {"length_scale": 4.0}), Cause("rate", 1.0, {"rate": 74.0}))),
             "Gravity is 39.2 m/s² instead of 9.81: either lengths are 4 times the true ones, or the rate is 2 times the true one. "
-            "To distinguish: measure the height at rest on a known face, or a length in the recording. Remedy: length_scale = 4, or rate "
-            "= 74.",
+            "To distinguish: compare a length in the recording with the true one, and the rate with a clock in the picture. Remedy: "
+            "length_scale = 4, or rate = 74.",
         ),
         (
             Finding("quaternion", 0.43, 1.0, causes=(Cause("order of the quaternions", keys={"quaternion": "wxyz"}),)),

@@ -97,7 +97,7 @@ class Check:
     @property
     def reads_the_columns_right(self) -> bool:
         """Whether the header states units, axes, quaternions and the floor correctly; an error of the scale is ignored."""
-        return not any(finding.kind in ("up", "unit", "quaternion", "body axes", "floor") for finding in self.findings)
+        return not any(finding.kind in ("up", "unit", "quaternion", "body axes", "floor", "below") for finding in self.findings)
 
 
 def log_check(recording: Flights | Log | str | Path) -> Check:

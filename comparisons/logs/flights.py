@@ -153,12 +153,12 @@ def _above_floor(header: Header, flights: list[Flight | None]) -> list[Flight | 
     """The flights without those of bodies that stay on the floor or below it; all, if these are half: the floor is elsewhere then."""
     if header.floor is None:
         return flights
-    high = [None if flight is None else flight if _height(header, flight) > HIGH * header.body.size else None for flight in flights]
+    high = [None if flight is None else flight if highest(header, flight) > HIGH * header.body.size else None for flight in flights]
     return high if 2 * high.count(None) < len(flights) + flights.count(None) else flights
 
 
-def _height(header: Header, flight: Flight) -> float:
-    """The largest height of the body's lowest point [m]."""
+def highest(header: Header, flight: Flight) -> float:
+    """The largest height of the body's lowest point above the floor during a flight [m]."""
     frames = slice(flight.first, flight.end)
     return float(heights(header, flight.toss.position[frames], flight.toss.orientation[frames]).max())
 

@@ -8,7 +8,7 @@ from itertools import permutations
 import numpy as np
 
 from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, SURPRISING, Flight, noise_of, surprise, window_size
-from dropspin.comparisons.logs.flights import Flights
+from dropspin.comparisons.logs.flights import Flights, highest
 from dropspin.comparisons.logs.log import UPRIGHT, Cause, Finding, Header, Log, Toss
 from dropspin.comparisons.logs.noise import Noise
 from dropspin.comparisons.logs.rest import level_share, rests
@@ -220,13 +220,18 @@ def _interrupted(flight: Flight, shared: Array, noise: Noise, *, by_bad_frames: 
 
 
 def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:
-    """Of bodies that rest above the floor or below it by more than errors of the scale and of the tracked point explain.
+    """Of bodies that rest above the floor or below it by more than errors of the scale and of the tracked point explain, or fly below it.
 
     `alarm` is the probability with which these errors may be larger.
     """
     header, found, resting = flights.log.header, flights.moving, rests(flights.log)
     above, error = resting.above()
-    if header.floor is None or not flights.show_offset.all() or not math.isfinite(above):
+    if header.floor is None:
+        return
+    if not flights.show_offset.all() or not math.isfinite(above):
+        height, toss = min((highest(header, flight), flight.toss.name) for flight in flights.found)
+        if height < 0.0:
+            yield Finding("below", -height, 0.0, toss)
         return
     wide, off = found.half_widths(alarm), header.tracked_from_centre - found.values[OFFSET]
     by_scale = (abs(found.values[1] / header.gravity + 1.0) + wide[1] / header.gravity) * float(np.mean(resting.expected))

@@ -22,6 +22,7 @@ KINDS = {
     "spin": "the recorded angular velocity differs by {percent:.0f} % from that of the quaternions",
     "velocity": "the recorded velocity differs by {percent:.0f} % from that of the positions",
     "floor": "bodies at rest are {mm_off:.4g} mm {side} the floor of the header",
+    "below": "toss {toss}: the body is at least {mm:.4g} mm below the floor of the header during all of its flight",
     "no flight": "toss {toss}: no free flight of at least {expected:.0f} frames",
     "frame dropped": "toss {toss}: number of frames missing before frame {frame}: {value:.0f}",
     "bad frame": "toss {toss}, frame {frame}: number of frames that are off the flight that continues after them: {value:.0f}",
@@ -65,6 +66,7 @@ LESS_OR_MORE = {
 }
 """The words for lengths and rates that are wrong by at most a half, too small and too large."""
 REMEDIES = {
+    "below": "correct floor_height, up, tracked_point or the size of the body",
     "rotation": "record more frames per second, or spin the body less: it has to turn by much less than half a turn between two frames",
     "drag": "engines simulate no air; shorter falls or a denser body reduce the effect of drag",
     "no flight": "begin the recording when the body is released",

@@ -403,6 +403,13 @@ def test_a_bad_frame_is_named_and_not_a_late_flight() -> None:
     assert (found.kind, found.toss, found.frame, found.value) == ("bad frame", log.tosses[3].name, 12, 1.0)
 
 
+def test_bodies_that_fly_below_the_floor_are_a_finding_without_rests() -> None:
+    log = made(1, 5, NOISE, header={"body": CUBE, "floor": {"restitution": 0.3, "friction": 0.3}}).log
+    found = only(log_check(changed(log, position=lambda toss: toss.position - [0.0, 3.0, 0.0])))
+    assert found.kind == "below"
+    assert 1.5 < found.value < 2.5
+
+
 @pytest.mark.parametrize("speed", [0.0, 1.0])
 def test_a_body_that_rests_or_slides_does_not_fly(speed: float) -> None:
     """A deceleration along the floor is no gravity."""

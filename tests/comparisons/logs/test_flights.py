@@ -102,6 +102,18 @@ def test_intervals_of_parameters_and_starts_hold(sets: int, count: int, body: di
 
 
 @pytest.mark.extended
+def test_ratios_of_inertia_are_those_of_the_motion_however_wrong_the_header_is() -> None:
+    moments = np.array(BRICK["inertia"]) * [1.0, 1.3, 1.0]
+    log = made(1, 4, (1e-5, 1e-4), spin=8.0).log
+    wrong = replace(
+        log,
+        header=log.header.model_copy(update={"body": made(1, 0, header={"body": BRICK | {"inertia": moments.tolist()}}).log.header.body}),
+    )
+    turning = found(wrong).turning
+    np.testing.assert_array_less(np.abs(turning.values - np.log(1.3)), turning.half_widths())
+    assert (turning.half_widths() < 0.005).all()
+
+
 def test_a_toss_that_errs_much_more_than_the_others_does_not_move_the_result() -> None:
     recording = made(5, 20, (2e-4, 2e-3), header={"body": CUBE})
     before = found(recording.log)

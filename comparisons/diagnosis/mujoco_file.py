@@ -13,6 +13,7 @@ import numpy as np
 from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mujoco_compiled import placed
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of
+from dropspin.comparisons.diagnosis.mujoco_recompiled import LEAST, Recompiled
 from dropspin.comparisons.diagnosis.mujoco_shapes import ALONG, distance_to, kind_of
 from dropspin.comparisons.diagnosis.source import option_setting, read_source
 from dropspin.comparisons.diagnosis.urdf_file import package_remedy, verify_one_root
@@ -35,8 +36,6 @@ OPTIONS = [name for name in dir(mujoco.MjSpec().option) if not name.startswith("
 MOST_NAMES, MOST_LISTED = 20, 3
 TURNED = 1e-6
 """Difference of |cos(angle / 2)| from 1 up to which two orientations are the same."""
-LEAST = 2e-15
-"""Just above the smallest mass [kg] and moment [kg m²] that MuJoCo accepts: those of bodies of which a file says nothing."""
 LONGEST_STEP = 0.1
 """The longest time step [s] in which the motions, of a second or less, are resolved."""
 ADDED = "a plane with default settings"
@@ -69,7 +68,9 @@ class MuJoCoFile:
         if not 0.0 < self.model.opt.timestep <= LONGEST_STEP:
             written = option_setting(self.source, "option", "timestep", "")
             raise DropspinError(f"{given}: {written}: a time step must be above 0 and at most {LONGEST_STEP:g} s.")
-        _, self.data = placed(self.model)
+        self.compiled = placed(self.model)
+        self.data = self.compiled[1]
+        self.recompiled = Recompiled(self._spec)
         flags, bit = self.model.opt.disableflags, mujoco.mjtDisableBit
         self.gravity = np.zeros(3) if flags & bit.mjDSBL_GRAVITY else np.array(self.model.opt.gravity)
         self.has_contacts = not flags & (bit.mjDSBL_CONTACT | bit.mjDSBL_CONSTRAINT)
@@ -92,49 +93,6 @@ class MuJoCoFile:
         """The numbers of bodies or geometries by name; one without a name is called by its kind and number."""
         what, number = ("body", self.model.nbody) if kind == BODY else ("geom", self.model.ngeom)
         return {printable(mujoco.mj_id2name(self.model, kind, one) or f"{what} {one}"): one for one in range(number)}
-
-    @cached_property
-    def unchanged(self) -> tuple[Any, Any]:
-        """The model, with its data, before the compiler changes masses and inertias of the file; impossible ones are balanced."""
-        spec = self._spec.copy()
-        spec.compiler.boundmass, spec.compiler.boundinertia, spec.compiler.settotalmass = LEAST, LEAST, -1.0
-        spec.compiler.balanceinertia, spec.compiler.inertiafromgeom = True, mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
-        with quiet():
-            return placed(spec.compile())
-
-    @cached_property
-    def exact(self) -> tuple[Any, Any] | None:
-        """The model, with its data, if meshes have exact volumes, of which MuJoCo counts parts twice by default.
-
-        None without such meshes, or if MuJoCo refuses one: its surface is open, or inside out.
-        """
-        spec = self._spec.copy()
-        counted = [mesh for mesh in spec.meshes if mesh.inertia == mujoco.mjtMeshInertia.mjMESH_INERTIA_LEGACY]
-        for mesh in counted:
-            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT
-        return self._recompiled(spec) if counted else None
-
-    @cached_property
-    def without_visual(self) -> tuple[Any, Any] | None:
-        """The model, with its data, if geometries that collide with nothing, and of which the file gives no mass, have none.
-
-        Those of a body that has no other geometry keep theirs. None without such geometries.
-        """
-        spec, changed = self._spec.copy(), False
-        for body in spec.bodies:
-            visual = [geom for geom in body.geoms if not (geom.contype or geom.conaffinity or spec.pairs)]
-            for geom in visual if len(visual) < len(body.geoms) else ():
-                changed = changed or math.isnan(geom.mass)
-                geom.mass = 0.0 if math.isnan(geom.mass) else geom.mass
-        return self._recompiled(spec) if changed else None
-
-    def _recompiled(self, spec: Any) -> tuple[Any, Any] | None:
-        """A changed model, with its data; None if MuJoCo refuses it."""
-        try:
-            with quiet():
-                return placed(spec.compile())
-        except ValueError:
-            return None
 
     @cached_property
     def heads(self) -> dict[str, int]:

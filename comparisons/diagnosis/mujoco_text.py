@@ -15,6 +15,7 @@ from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
 from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
 from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, owner_of, pair_element
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, MuJoCoFile
+from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL
 from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
 from dropspin.comparisons.diagnosis.urdf_file import for_other_simulators
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM
@@ -29,11 +30,6 @@ IN_FORCE |= {"stiffness": math.nan, "damping": math.nan}
 """The settings of a contact in a URDF file, which MuJoCo does not read, and what it has instead."""
 FURTHER = {"torsional": (1, 4, 0.005), "rolling": (2, 6, 1e-4)}
 """The place of a coefficient of friction, the dimensions of contacts that have it, and its default."""
-CHANGED_BY = {
-    "mass": ("boundmass", "settotalmass", "inertiafromgeom"),
-    "inertia": ("balanceinertia", "boundinertia", "settotalmass", "inertiafromgeom"),
-}
-"""Settings of the compiler that change the mass and the inertia of a file."""
 
 
 class BodyText:
@@ -64,11 +60,15 @@ class BodyText:
     def written(self) -> MassProperties | None:
         """What the file says of the body and of what is welded to it, with moments that MuJoCo would balance as they are written."""
         tensor = self._tensor
-        found = mass_properties(*self._file.unchanged, self._file.group(self._head))
+        found = self._properties(self._file.recompiled.unchanged)
         if found is None or tensor is None:
             return found
         wanted, has = np.linalg.eigvalsh(tensor), np.linalg.eigvalsh(found.inertia)
-        return found._replace(inertia=tensor) if np.abs(wanted - has).max() > SAME * np.abs(wanted).max() else found
+        return found._replace(inertia=tensor) if _differ(wanted, has) else found
+
+    def _properties(self, compiled: tuple[Any, Any] | None) -> MassProperties | None:
+        """Those of the body and of what is welded to it in a compiled model with its data; None without mass or without a model."""
+        return None if compiled is None else mass_properties(*compiled, self._file.group(self._head))
 
     @cached_property
     def _tensor(self) -> Array | None:
@@ -188,9 +188,9 @@ class BodyText:
             yield "solref", settings.get("solref", Setting("solref")), f"raised to a time constant of {constant:g} s, two time steps"
         if written is not None:
             wanted, has = np.linalg.eigvalsh(written.inertia), np.linalg.eigvalsh(in_force.inertia)
-            if abs(written.mass - in_force.mass) > SAME * written.mass:
+            if _differ(written.mass, in_force.mass):
                 yield self._changed("mass", f"changed: {in_force.mass:.4g} kg")
-            if np.abs(wanted - has).max() > SAME * np.abs(wanted).max():
+            if _differ(wanted, has):
                 made = f"refused ({self._file.refusal}); measured with balanceinertia" if self._file.refusal else "changed"
                 made = made if wanted.any() else "0, with which MuJoCo simulates no body; measured with that of a uniform solid"
                 yield self._changed("inertia", f"{made}: moments {digits(has.tolist())} kg m²")
@@ -217,12 +217,9 @@ class BodyText:
 
     def _miscounted(self) -> Iterator[tuple[str, Setting, str]]:
         """A mass that is not that of the volumes of the body's meshes."""
-        if self._file.exact is None:
-            return
-        group = self._file.group(self._head)
-        has, exact = (mass_properties(*compiled, group) for compiled in ((self._file.model, self._file.data), self._file.exact))
+        has, exact = self._properties(self._file.compiled), self._properties(self._file.recompiled.exact)
         if has is not None and exact is not None and abs(has.mass - exact.mass) > NOTEWORTHY * exact.mass:
-            model = self._file.model
+            model, group = self._file.model, self._file.group(self._head)
             used = {
                 mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MESH, model.geom_dataid[geom])
                 for geom in np.flatnonzero(np.isin(model.geom_bodyid, group))
@@ -258,11 +255,8 @@ class BodyText:
 
     def _visual(self) -> Iterator[tuple[str, Setting, str]]:
         """Geometries that collide with nothing, and count in the mass by their density."""
-        if self._file.without_visual is None or self.element is None:
-            return
-        group = self._file.group(self._head)
-        has, least = (mass_properties(*compiled, group) for compiled in ((self._file.model, self._file.data), self._file.without_visual))
-        if has is None or least is None or not has.mass - least.mass > NOTEWORTHY * has.mass:
+        has, least = self._properties(self._file.compiled), self._properties(self._file.recompiled.without_visual)
+        if self.element is None or has is None or least is None or not has.mass - least.mass > NOTEWORTHY * has.mass:
             return
         model, elements = self._file.model, [geom for geom in self.element.every("geom") if owner_of(geom) is self.element]
         geoms = np.flatnonzero(model.geom_bodyid == self._head)
@@ -272,10 +266,18 @@ class BodyText:
         yield "visual", words, f"counted in the mass with {has.mass - least.mass:.4g} kg, by density, although it collides with nothing"
 
     def _changed(self, name: str, made: str) -> tuple[str, Setting, str]:
-        """A quantity that the compiler changes, with what is written, and the setting that changes it."""
-        found = [option_setting(self._file.source, "compiler", setting, "") for setting in CHANGED_BY[name]]
-        why = [setting for setting in found if setting.file]
+        """A quantity that the compiler changes, with what is written, and the settings of which each alone makes a difference."""
+        has, why = getattr(self._properties(self._file.compiled), name), []
+        for setting in NEUTRAL:
+            words = option_setting(self._file.source, "compiler", setting, "")
+            other = self._properties(self._file.recompiled.without(setting)) if words.file else None
+            why += [words] * bool(words.file and (other is None or _differ(getattr(other, name), has)))
         written = self.settings.get(name)
         if written is None:
             return name, why[0] if why else Setting(name), made
-        return name, written, made + (f", by {why[0]}" if why else "")
+        return name, written, made + (f", by {', '.join(map(str, why))}" if why else "")
+
+
+def _differ(wanted: Any, has: Any) -> bool:
+    """Whether numbers differ by more than rounding from those that were written."""
+    return bool(np.abs(np.subtract(wanted, has)).max() > SAME * np.abs(wanted).max())

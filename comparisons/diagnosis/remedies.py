@@ -38,7 +38,11 @@ class Targets(NamedTuple):
         A contact with a plane that is added in place of what the file has is not judged.
         """
         is_of_file = not (body.facts.missed or body.facts.left_out)
-        yield from (self._judged(body, answer) if is_of_file else answer for answer in answers)
+        missing = [answer for answer in answers if is_of_file and not self.meets(answer)]
+        remedies = self._for_restitution(body, answers) if any(answer.quantity == REBOUND for answer in missing) else {}
+        for answer in answers:
+            finding = Finding("target", (), remedies.get(answer.speed, ()), f"the target is {self.wanted.get(answer.quantity, math.nan):g}")
+            yield replace(answer, findings=(*answer.findings, finding)) if answer in missing else answer
         measured = {answer.quantity for answer in answers if is_of_file}
         for quantity in (name for name in self.wanted if name not in measured):
             question = "impact" if quantity == REBOUND else "friction"
@@ -50,21 +54,17 @@ class Targets(NamedTuple):
         wanted = self.wanted.get(answer.quantity)
         return wanted is None or abs(answer.measured - wanted) <= NOTEWORTHY
 
-    def _judged(self, body: LooseBody, answer: Answer) -> Answer:
-        """An answer that misses its target as a finding, with settings for the restitution if they come closer."""
-        if self.meets(answer):
-            return answer
-        wanted = self.wanted[answer.quantity]
-        remedies: list[Remedy] = []
-        if answer.quantity == REBOUND:
-            for step in (body.facts.dt, _rounded(0.125 * body.facts.dt)):
-                changes = body.for_restitution(wanted, step)
-                other = rebound(body.changed(changes), [step], answer.speed, REBOUND)
-                remedies = [Remedy(body.patch(changes, step), other.measured, other.unit, *body.elsewhere(step, changes))]
-                if abs(other.measured - wanted) <= NOTEWORTHY:
-                    break
-        finding = Finding("target", remedies=tuple(remedies), detail=f"the target is {wanted:g}")
-        return replace(answer, findings=(*answer.findings, finding))
+    def _for_restitution(self, body: LooseBody, answers: Sequence[Answer]) -> dict[float, tuple[Remedy]]:
+        """By the speed of an impact, settings for the restitution: at the file's time step, if these meet the target at all speeds."""
+        found: dict[float, tuple[Remedy]] = {}
+        for step in (body.facts.dt, _rounded(0.125 * body.facts.dt)):
+            changes = body.for_restitution(self.wanted[REBOUND], step)
+            text, elsewhere, lively = body.patch(changes, step), body.elsewhere(step, changes), body.changed(changes)
+            others = [rebound(lively, [step], answer.speed, REBOUND) for answer in answers if answer.quantity == REBOUND]
+            found = {other.speed: (Remedy(text, other.measured, other.unit, *elsewhere),) for other in others}
+            if all(map(self.meets, others)):
+                break
+        return found
 
 
 def _why_unmeasured(facts: Facts) -> str:

@@ -149,3 +149,12 @@ def test_body_without_a_result_is_not_a_sound_one():
     assert not Diagnosis("f", (sound, declined)).broke_down
     assert Diagnosis("f", (sound, declined._replace(declined=False))).broke_down
     assert Diagnosis("f", (sound, declined._replace(name="b"))).broke_down
+
+
+@pytest.mark.parametrize(("wanted", "step"), [(0.3, 2.5e-4), (0.5, 2e-3)])
+def test_one_change_is_given_for_a_restitution_at_all_speeds(tmp_path, wanted, step):
+    """At the file's step, the damper for 0.3 gives 0.268 at 0.5 m/s and 0.296 at 3 m/s, that for 0.5 gives 0.507 and 0.5015."""
+    body = body_of(tmp_path, BALL.format(""))
+    missed = [answer.findings[0].remedies for answer in Targets(wanted).judged(body, impact(body, ladder(body))) if answer.findings]
+    assert {remedy.text for remedies in missed for remedy in remedies} == {body.patch(body.for_restitution(wanted, step), step)}
+    assert [remedy.value for [remedy] in missed] == pytest.approx([wanted] * 3, abs=0.01)

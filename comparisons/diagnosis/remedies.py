@@ -15,6 +15,8 @@ from dropspin.comparisons.running.ablation import shares
 HALVINGS = (1.0, 0.5, 0.25)
 SAFE = 0.85
 """Factor on the time step at which an error of first order would be as large as a finding."""
+MOST = 0.5
+"""Share of an error that is left at most if what was changed is named as its cause."""
 SHORTEST = 0.01
 """The shortest time step that is tried, relative to that of the file: nobody would run a hundred times as many steps."""
 Question = Callable[[LooseBody, Sequence[float]], list[Answer]]
@@ -132,8 +134,10 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
         changes = body.changes(settings)
         if settings in found or (len(settings) > 1 and found) or body.patch(changes, step) in {one.text for one in found.values()}:
             continue
+        may_stay = not finding.is_error or (finding.kind == "time step" and not settings)
         for other in again(settings, step):
-            if not any(one.is_error == finding.is_error or body.facts.unknown for one in other.findings):
+            stays = abs(other.measured - other.in_force) > MOST * abs(answer.measured - answer.in_force)
+            if (may_stay or not stays) and not any(one.is_error == finding.is_error or body.facts.unknown for one in other.findings):
                 found[settings] = Remedy(body.patch(changes, step), other.measured, other.unit, *body.elsewhere(step, changes))
                 changed = changed or {*changes, *["timestep"] * (step != body.facts.dt)}
     if not found and finding.is_error:

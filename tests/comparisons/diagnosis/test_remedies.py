@@ -48,6 +48,31 @@ def test_settings_without_effect_are_not_named_as_causes():
     assert sentence.startswith("Slide, engine: stopping distance is 0.8 m instead of 1 m: not removed by a change of cone=")
 
 
+@pytest.mark.parametrize(("left", "settings", "remedies"), [(0.04, ("cone",), 2), (0.09, ("timestep",), 1)])
+def test_setting_is_named_if_it_explains_most_of_an_error(left, settings, remedies):
+    """Both the cone and a smaller time step bring an error of 11 % within 10 %."""
+
+    class Body(Stubborn):
+        error = 0.11
+
+        def tried(self, settings):
+            changed = Body()
+            changed.error = left if settings else 0.11
+            return changed
+
+        def elsewhere(self, dt, changes):
+            return 0, True
+
+    def slide(body, dts):
+        error = min(body.error, 0.01 if dts[0] < 0.01 else 1.0)
+        found = (Finding("time step", ("cone", "timestep")),) * (error > 0.1)
+        return [Answer("slide", "stopping distance", "m", measured=1.0 - error, in_force=1.0, findings=found)]
+
+    [answer] = answers_to(slide, Body())
+    [finding] = answer.findings
+    assert (finding.settings, len(finding.remedies)) == (settings, remedies)
+
+
 def test_a_large_error_is_not_tried_at_a_million_steps_per_second():
     body = Stubborn()
 

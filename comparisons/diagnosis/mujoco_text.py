@@ -17,7 +17,7 @@ from dropspin.comparisons.diagnosis.mujoco_elements import body_element, childre
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL
 from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
-from dropspin.comparisons.diagnosis.urdf_file import for_other_simulators
+from dropspin.comparisons.diagnosis.urdf_file import used_by_neither_engine
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
@@ -26,8 +26,8 @@ OF_JOINT = ("damping", "armature", "frictionloss")
 SAME = 1e-6
 """Relative difference up to which a moment of inertia is the one that was written."""
 IN_FORCE = {"lateral_friction": 1.0, "rolling_friction": 0.0, "spinning_friction": 0.0, "restitution": 0.0}
-IN_FORCE |= {"stiffness": math.nan, "damping": math.nan}
-"""The settings of a contact in a URDF file, which MuJoCo does not read, and what it has instead."""
+IN_FORCE |= {"inertia_scaling": 1.0} | dict.fromkeys(("stiffness", "damping", "friction_anchor"), math.nan)
+"""The settings of inertia and contact in a URDF file, which MuJoCo does not read, and what it has instead."""
 FURTHER = {"torsional": (1, 4, 0.005), "rolling": (2, 6, 1e-4)}
 """The place of a coefficient of friction, the dimensions of contacts that have it, and its default."""
 
@@ -242,7 +242,7 @@ class BodyText:
         for number, link in self._links.items():
             of_link = "" if number == self._head else f" of {link.attributes['name']}"
             unread = [found for tag, value in IN_FORCE.items() for found in link.every(tag) if found.number("value", value) != value]
-            for found in (*unread, *for_other_simulators(link)):
+            for found in (*unread, *used_by_neither_engine(link)):
                 yield f"{found.tag}{of_link}", found.words, "not read"
 
     def _without_inertial(self) -> Iterator[tuple[str, Setting, str]]:

@@ -11,7 +11,7 @@ from dropspin.comparisons.diagnosis.answers import digits
 from dropspin.comparisons.diagnosis.parts import Part, mesh_shape, solid
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.source import Element, Setting
-from dropspin.comparisons.diagnosis.urdf_file import UrdfFile, for_other_simulators
+from dropspin.comparisons.diagnosis.urdf_file import UrdfFile, used_by_neither_engine
 from dropspin.comparisons.engines.pybullet_simulation import Z_TO_Y
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.bodies import Capsule, Cylinder, Shape
@@ -118,7 +118,7 @@ class Link(NamedTuple):
             elif element.tag == "restitution" and self.restitution * restitution != self.restitution:
                 of_surface = f"the product with the restitution {restitution:g} of {surface}"
                 yield element.tag, element.words, f"{self.restitution * restitution:g}, {of_surface}"
-        yield from ((element.tag, element.words, "not read") for element in for_other_simulators(self.element))
+        yield from ((element.tag, element.words, "not read") for element in used_by_neither_engine(self.element))
         for collision in self.element.every("collision"):
             for element in collision.every("cylinder"):
                 yield "cylinder", element.words, f"replaced by the convex hull of 64 points, with a margin of {MARGIN:g} m"

@@ -13,8 +13,8 @@ from dropspin.scenarios.text import printable
 FIXED = ("fixed", "floating")
 """Types of joints of which PyBullet makes fixed ones."""
 
-OF_OTHERS = ("mu1", "mu2", "kp", "kd", "drake:mu_static", "drake:mu_dynamic")
-"""Elements by which Gazebo and Drake read settings of contacts."""
+UNUSED = ("mu1", "mu2", "kp", "kd", "drake:mu_static", "drake:mu_dynamic", "contact_cfm", "contact_erp")
+"""Settings of contacts for Gazebo and Drake, and two that Bullet's loader reads and Bullet does not use."""
 
 PACKAGES = ("package://", "model://")
 """How ROS and Gazebo begin paths in folders that they look up."""
@@ -117,13 +117,13 @@ def _parents(source: Element) -> dict[str, Element]:
     return {_end(joint, "child"): joint for joint in source.children if joint.tag == "joint"}
 
 
-def for_other_simulators(link: Element) -> Iterator[Element]:
-    """The settings of a link's contacts that Gazebo and Drake alone read, those in <gazebo> elements of the file too."""
+def used_by_neither_engine(link: Element) -> Iterator[Element]:
+    """The settings of a link's contacts that MuJoCo and PyBullet do not use, those in <gazebo> elements of the file too."""
     name, robot = link.attributes.get("name"), link.parent
-    yield from link.every(*OF_OTHERS)
+    yield from link.every(*UNUSED)
     for element in [] if robot is None else robot.children:
         if element.tag == "gazebo" and element.attributes.get("reference", name) == name:
-            yield from element.every(*OF_OTHERS)
+            yield from element.every(*UNUSED)
 
 
 def _end(joint: Element, which: str) -> str:

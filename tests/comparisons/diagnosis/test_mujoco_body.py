@@ -265,15 +265,15 @@ def test_pyramid_is_told_from_dry_friction_of_the_joint(tmp_path):
 
 
 def test_friction_of_a_urdf_is_not_read(tmp_path):
-    contact = '<contact><lateral_friction value="0.3"/><rolling_friction value="0"/></contact>'
+    contact = '<contact><lateral_friction value="0.3"/><rolling_friction value="0"/><inertia_scaling value="2"/></contact>'
     shape = '<collision><geometry><box size=".1 .1 .1"/></geometry></collision>'
     mass = '<inertial><mass value="1"/><inertia ixx=".002" iyy=".002" izz=".002" ixy="0" ixz="0" iyz="0"/></inertial>'
     body = body_of(tmp_path, f'<robot name="r"><link name="l">{contact}{mass}{shape}</link></robot>', file="model.urdf")
     assert body.facts.friction == 1.0
-    assert [name for name, _, made in body.facts.ignored if made == "not read"] == ["lateral_friction"]
+    assert [name for name, _, made in body.facts.ignored if made == "not read"] == ["lateral_friction", "inertia_scaling"]
 
 
-def test_settings_of_contacts_for_other_simulators_are_not_read_by_either_engine(tmp_path):
+def test_settings_of_contacts_that_neither_engine_reads_are_named(tmp_path):
     """Of the body and of what is fixed to it, and not of other links."""
     pytest.importorskip("pybullet", exc_type=ImportError)
     from dropspin.comparisons.diagnosis.pybullet_body import PyBulletModel
@@ -284,14 +284,20 @@ def test_settings_of_contacts_for_other_simulators_are_not_read_by_either_engine
     links = "".join(link.format(name, drake if name == "fixed" else "") for name in ("base", "fixed", "arm"))
     joint = '<joint name="{1}" type="{0}"><parent link="base"/><child link="{1}"/><axis xyz="0 0 1"/></joint>'
     joints = joint.format("fixed", "fixed") + joint.format("continuous", "arm")
-    gazebo = "<gazebo reference='{}'>\n<mu1>.2</mu1><material>Gazebo/Red</material></gazebo>"
+    gazebo = "<gazebo reference='{}'>\n<mu1>.2</mu1><contact_cfm/><material>Gazebo/Red</material></gazebo>"
     text = f'<robot name="r">{links}{joints}{gazebo.format("base")}{gazebo.format("arm")}<gazebo><kp>1e6</kp></gazebo></robot>'
     of_mujoco = body_of(tmp_path, text, name="base", file="model.urdf").facts.ignored
     of_pybullet = PyBulletModel(tmp_path / "model.urdf", "model.urdf").body("base", None).facts.ignored
     for ignored in (of_mujoco, of_pybullet):
         found = [(name, setting.text, setting.line) for name, setting, made in ignored if made == "not read"]
         drake_of_fixed = ("drake:mu_static of fixed", '<drake:mu_static value=".6">', 1)
-        assert found == [("mu1", "<mu1>", 2), ("kp", "<kp>", 3), drake_of_fixed, ("kp of fixed", "<kp>", 3)]
+        assert found == [
+            ("mu1", "<mu1>", 2),
+            ("contact_cfm", "<contact_cfm>", 2),
+            ("kp", "<kp>", 3),
+            drake_of_fixed,
+            ("kp of fixed", "<kp>", 3),
+        ]
 
 
 def test_an_answer_has_a_finding_for_each_cause(tmp_path):

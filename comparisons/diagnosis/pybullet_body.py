@@ -46,6 +46,7 @@ CALLS = {
     "damping": "changeDynamics(body, -1, linearDamping=0, angularDamping=0)",
     "inertia": "loadURDF(..., flags=URDF_USE_INERTIA_FROM_FILE)",
     "contactERP": "setPhysicsEngineParameter(contactERP={:g})",
+    "stiffness": "the file without <stiffness> and <damping>",
     "restitution": "changeDynamics(plane, -1, restitution={:g})",
     "own restitution": "changeDynamics(body, -1, restitution={:g})",
 }
@@ -91,7 +92,8 @@ class PyBulletBody(LooseBody):
 
     def __init__(self, model: PyBulletModel, name: str, changes: Changes) -> None:
         self._model, self._name, self._changes = model, name, changes
-        self._file = str(model.path) if len(model.heads) == 1 else model.cut_loose(name)
+        without = ("stiffness", "damping") if "stiffness" in changes else ()
+        self._file = model.cut_loose(name, *without) if without or len(model.heads) > 1 else str(model.path)
         body, self._plane = self._world(True)
         self._links = read_links(model, body)
         first = self._links[0]
@@ -106,8 +108,10 @@ class PyBulletBody(LooseBody):
         centre = np.average(centres, axis=0, weights=self._masses)
         self._arms, self._arm = centres - centre, unrotate(first.turn, centre - first.position)
         self.facts = self._facts(centre, own)
-        self.causes = {"impact": ("contactERP",) if "stiffness" not in self.facts.settings else ("stiffness",)}
+        of_spring = dict.fromkeys(("slide", "roll"), ("stiffness",))
+        self.causes = of_spring if "stiffness" in self.facts.settings else {"impact": ("contactERP",)}
         self.remedies = {"damping": {"damping": 0.0}, "inertia": {"inertia": "file"}, "contactERP": {"contactERP": 0.0}}
+        self.remedies["stiffness"] = {"stiffness": "none"}
         if any(link.restitution > 0.0 for link in self._touching):
             self.remedies["restitution"] = {"restitution": 1.0}
 

@@ -72,15 +72,15 @@ class UrdfFile:
         """The joints between a body and the links that are fixed to it."""
         return [self._parents[name] for name in self.heads[head] if name != head]
 
-    def cut_loose(self, head: str) -> str:
-        """A URDF file of a body and of what is fixed to it, with the meshes' absolute paths."""
-        links = [self.links[name] for name in self.heads[head]]
-        return f'<robot name="loose">{"".join(map(self.written, [*links, *self.joints(head)]))}</robot>'
+    def cut_loose(self, head: str, *without: str) -> str:
+        """A URDF file of a body and of what is fixed to it, with the meshes' absolute paths, and without some elements."""
+        elements = [*(self.links[name] for name in self.heads[head]), *self.joints(head)]
+        return f'<robot name="loose">{"".join(self.written(element, *without) for element in elements)}</robot>'
 
-    def written(self, element: Element) -> str:
-        """An element as XML, without materials, which may refer to others."""
+    def written(self, element: Element, *without: str) -> str:
+        """An element as XML, without some elements and without materials, which may refer to others."""
         values = {key: self._mesh(text) if key == "filename" else text for key, text in element.attributes.items()}
-        within = "".join(self.written(child) for child in element.children if child.tag != "material")
+        within = "".join(self.written(child, *without) for child in element.children if child.tag not in ("material", *without))
         return f"<{element.tag} {' '.join(f'{key}={quoteattr(text)}' for key, text in values.items())}>{within}</{element.tag}>"
 
     def _mesh(self, filename: str) -> str:

@@ -30,7 +30,9 @@ def inertia(facts: Facts) -> list[Answer]:
 
 def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | None) -> Iterator[Answer]:
     """Why no body has an inertia, or no body of this shape, mass and centre of mass."""
-    remedies = () if solid is None else (Remedy(f"the inertia of a uniform solid, {_components(solid.inertia)}"),)
+    points = facts.points + facts.offset - given.centre if facts.parts else np.zeros((0, 3))
+    off = np.zeros(3) if solid is None else solid.centre - given.centre
+    displaced = f"displaced by ({digits(np.where(np.abs(off) > ROUNDING * np.abs(off).max(), off, 0.0))}) m along the body's axes"
     least, middle, largest = np.linalg.eigvalsh(given.inertia).tolist()
     quantity, possible = "largest moment / sum of others", "at most 1 for any body"
     if least <= 0.0:
@@ -41,14 +43,11 @@ def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | Non
         if not facts.parts:
             return
         squares = mean_squares(given.inertia, given.mass)
-        points = facts.points + facts.offset - given.centre
         excess = _excess(points, squares)
         if excess <= INERTIA_ROUNDING:
             return
-        off = np.zeros(3) if solid is None else solid.centre - given.centre
         if off.any() and _excess(points - off, squares) <= INERTIA_ROUNDING:
-            shown = digits(np.where(np.abs(off) > ROUNDING * np.abs(off).max(), off, 0.0))
-            remedy = Remedy(f"the centre of mass of a uniform solid, which is displaced by ({shown}) m along the body's axes")
+            remedy = Remedy(f"the centre of mass of a uniform solid, which is {displaced}")
             finding = Finding("impossible", ("centre",), (remedy,), "less for these moments, this mass and shape")
             yield Answer(
                 "inertia", "distance of the centre of mass from a solid's", "m", measured=float(np.linalg.norm(off)), findings=(finding,)
@@ -57,6 +56,10 @@ def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | Non
         quantity, possible = "second moments / largest possible", "at most 1 for this mass and shape"
         if (factor := largest / largest_possible(given, points)) > INERTIA_ROUNDING:
             quantity, excess = "largest moment / largest possible", factor
+    remedies: tuple[Remedy, ...] = ()
+    if solid is not None:
+        also = f", and its centre of mass, {displaced}" * (_excess(points, mean_squares(solid.inertia, solid.mass)) > INERTIA_ROUNDING)
+        remedies = (Remedy(f"the inertia of a uniform solid, {_components(solid.inertia)}{also}"),)
     finding = Finding("impossible", ("inertia",), remedies, possible)
     yield Answer("inertia", quantity, "1", measured=excess, physical=float(least > 0.0), findings=(finding,))
 

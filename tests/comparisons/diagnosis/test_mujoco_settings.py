@@ -76,6 +76,16 @@ def test_wrong_centre_of_mass_is_told_from_wrong_moments(tmp_path):
     assert [str(body.facts.settings[name]) for name in answer.findings[0].settings] == ['pos="0 0 0" (model.xml, line 1)']
 
 
+def test_inertia_of_a_solid_is_proposed_with_the_centre_of_mass_without_which_it_is_impossible(tmp_path):
+    """A rod with its moment about one end, ml²/3, too small a moment about its axis, and its centre of mass at that end."""
+    for place, also in ((".5", ", and its centre of mass, displaced by (0.5, 0, 0) m along the body's axes"), ("0", "")):
+        rod = f'<geom type="box" size=".5 .05 .02" pos="{place} 0 0"/><inertial pos="0 0 0" mass="1" diaginertia=".001 .333 .335"/>'
+        [answer] = impossible(body_of(tmp_path, FREE.format(rod), head='<compiler balanceinertia="true"/>'))
+        text = answer.findings[0].remedies[0].text
+        assert text.startswith("the inertia of a uniform solid")
+        assert text.endswith("about the body's axes" + also)
+
+
 def test_mass_and_inertia_that_the_compiler_changes_are_said(tmp_path):
     body = body_of(tmp_path, FREE.format(BOX), head='<compiler boundmass="3" boundinertia=".02"/>')
     changed = {name: (setting.text, made) for name, setting, made in body.facts.ignored}

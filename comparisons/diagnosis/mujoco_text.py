@@ -31,6 +31,9 @@ IN_FORCE |= {"inertia_scaling": 1.0} | dict.fromkeys(("stiffness", "damping", "f
 FURTHER = {"torsional": (1, 4, 0.005), "rolling": (2, 6, 1e-4)}
 """The place of a coefficient of friction, the dimensions of contacts that have it, and its default."""
 
+PER_METRE = {"cm": 100.0, "mm": 1000.0}
+"""Units of length in which models are written by mistake."""
+
 
 class BodyText:
     """What a file says of a body.
@@ -182,7 +185,11 @@ class BodyText:
             raised: Whether the time constant of a contact is raised.
             condim: The dimensions of the contact with what the body lands on; 0 without one.
         """
-        settings, written = self.settings, self.written
+        settings, written, gravity = self.settings, self.written, float(np.linalg.norm(self._file.gravity))
+        for unit, factor in PER_METRE.items():
+            if math.isclose(gravity, 9.81 * factor, rel_tol=NOTEWORTHY):
+                setting = option_setting(self._file.source, "option", "gravity", "")
+                yield "gravity", setting, f"taken as {gravity:g} m/s²; dropspin reads SI units, and this may be a model in {unit}"
         if raised:
             constant = 2.0 * self._file.model.opt.timestep
             yield "solref", settings.get("solref", Setting("solref")), f"raised to a time constant of {constant:g} s, two time steps"

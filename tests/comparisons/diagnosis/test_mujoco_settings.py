@@ -204,6 +204,14 @@ def test_stiffness_and_the_direction_of_gravity_are_left_out_and_named(tmp_path)
         assert facts.lands == (angle < 90)
 
 
+def test_model_in_millimetres_is_named(tmp_path):
+    """Gravity of 9.81 m/s² is 9810 mm/s²."""
+    named = [body_of(tmp_path, FREE.format(BOX), f'gravity="0 0 -{g}"').facts.ignored for g in (9810, 980.7, 9.81, 5000)]
+    assert [[name for name, *_ in ignored] for ignored in named] == [["gravity"], ["gravity"], [], []]
+    assert named[0][0][1].line == 1
+    assert "a model in mm" in named[0][0][2]
+
+
 @pytest.mark.parametrize(("head", "option"), [('<option><flag gravity="disable"/></option>', ""), ("", 'gravity="0 0 0"')])
 def test_absence_of_gravity_is_stated(tmp_path, head, option):
     [answer] = fall(body_of(tmp_path, FREE.format(BOX), option, head=head), [0.002])

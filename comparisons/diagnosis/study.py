@@ -58,7 +58,7 @@ class BodyDiagnosis(NamedTuple):
         answers: The measured values with their exact values and findings.
         settings: By name of a setting, its text in the model file, with file and line.
         unmodelled: Parts of the file, besides the body, that the simulations leave out.
-        breakdown: The reason why there are no answers; empty if there are answers.
+        breakdown: The reason why there are no answers, or none for which the body is simulated; empty if there is no such reason.
         declined: Whether that is because the engine cannot read or simulate the body, not because it broke down.
     """
 
@@ -177,12 +177,15 @@ def diagnose(
             def of_body(piece: tuple[EngineEntry, str], processes: EngineProcesses, report: Callable[[str], None]) -> BodyDiagnosis:
                 entry, name = piece
                 report(f"{name} with {entry.label}")
-                found = processes.call(entry, _diagnosed, path, given, name, on, Targets(restitution, friction))
+                asked = (path, given, name, on, Targets(restitution, friction))
+                found = processes.call(entry, _diagnosed, *asked, QUESTIONS)
                 if isinstance(found, BodyDiagnosis):
                     return found
                 declined = isinstance(found, DropspinError) or found.verdict == "declined"
                 longer = "; --time-limit gives it more" if isinstance(found, Breakdown) and found.verdict == "timed_out" else ""
-                return BodyDiagnosis(name, entry.label, breakdown=f"{found}{longer}", declined=declined)
+                without = found if declined else processes.call(entry, _diagnosed, *asked, ())
+                known = without if isinstance(without, BodyDiagnosis) else BodyDiagnosis(name, entry.label)
+                return known._replace(breakdown=f"{found}{longer}", declined=declined)
 
             found = [*refusals, *results_in_parallel(pieces, of_body, crews, on_progress or ignore)]
             if all(body.declined for body in found):
@@ -232,18 +235,20 @@ def _bodies(entry: EngineEntry, path: Path, given: str, wanted: Sequence[str], l
         return DropspinError(str(error))
 
 
-def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | None, targets: Targets) -> BodyDiagnosis | DropspinError:
-    """The diagnosis of a body; runs in the engine's process."""
+def _diagnosed(
+    entry: EngineEntry, path: Path, given: str, name: str, on: str | None, targets: Targets, questions: Sequence[Question]
+) -> BodyDiagnosis | DropspinError:
+    """The diagnosis of a body, with answers to some questions; runs in the engine's process."""
     given_to = (entry.adapter.name, path, given)
     try:
         body = _file(*given_to).body(name, on)
     except DropspinError as error:
         return DropspinError(str(error))
-    facts, known = body.facts, _known(*given_to, on, targets)
+    facts, known = body.facts, _known(*given_to, on, targets, questions)
     key = body.likeness
     if key in known:
         return known[key]._replace(name=name)
-    answers = inertia(facts) + [answer for question in QUESTIONS for answer in answers_to(question, body, targets)]
+    answers = inertia(facts) + [answer for question in questions for answer in answers_to(question, body, targets)]
     if facts.surface:
         frictions = (facts.friction, facts.friction_across)
         answers += [Answer("friction", COEFFICIENT, "1", measured=one) for one in frictions if not math.isnan(one)]

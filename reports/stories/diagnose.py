@@ -79,8 +79,9 @@ def _finding_cells(body: BodyDiagnosis, answer: Answer, finding: Finding | None)
 
 def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
     """The parts of a page on one body. With several bodies, a terminal shows a table instead, and `on_terminal` is false."""
-    if body.breakdown:
-        return [Paragraph(f"{body.name}: {body.breakdown.removesuffix('.')}.", style="bold", on_terminal=on_terminal)]
+    broken = [Paragraph(f"{body.name}: {why}.", style="bold", on_terminal=on_terminal) for why in _breakdown(body)]
+    if not body.answers:
+        return [*broken]
     others = f" (--on can choose {listed(body.others)})" if body.others else ""
     frictions = " and ".join(f"{one:g}" for one in (body.friction, body.friction_across) if not math.isnan(one))
     lands = (
@@ -92,12 +93,18 @@ def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
     head = f"{described}; {body.engine} {body.version}, time step {in_ms(body.dt)}{lands}."
     drawn = charts(body)
     return [
+        *broken,
         Heading(f"{body.name} in {body.engine}"),
         Paragraph(head, on_terminal=on_terminal),
         Table(answer_rows(body), on_terminal=on_terminal),
         Sentences([*sentences(body), *_left_out(body)], numbered=True, on_terminal=on_terminal),
         *([Charts(f"{body.name} {body.engine}", drawn)] if drawn else []),
     ]
+
+
+def _breakdown(body: BodyDiagnosis) -> list[str]:
+    """The reason why a simulation has no result, if there is one, without a full stop."""
+    return [body.breakdown.removesuffix(".")] * bool(body.breakdown)
 
 
 def _left_out(body: BodyDiagnosis) -> list[str]:
@@ -111,7 +118,7 @@ def of_several(bodies: Sequence[BodyDiagnosis]) -> list[str]:
     engines, names = {body.engine for body in bodies}, {body.name for body in bodies}
     for body in bodies:
         owner = " ".join([body.name] * (len(names) > 1) + [body.engine] * (len(engines) > 1))
-        for sentence in [f"{body.breakdown.removesuffix('.')}."] if body.breakdown else [*sentences(body), *_left_out(body)]:
+        for sentence in [*(f"{why}." for why in _breakdown(body)), *sentences(body), *_left_out(body)]:
             owners.setdefault(sentence, []).append(owner)
     return [f"{listed(of_sentence)}: {sentence}" for sentence, of_sentence in owners.items()]
 
@@ -124,7 +131,7 @@ def _overview(body: BodyDiagnosis) -> dict[str, str]:
         "engine": body.engine,
         "mass": f"{body.mass:.3g} kg",
         "lands on": body.surface or "–",
-        "findings": body.breakdown or findings or "none",
+        "findings": ", ".join([body.breakdown] * bool(body.breakdown) + [findings] * bool(findings)) or "none",
     }
 
 

@@ -93,6 +93,22 @@ def test_page_shows_what_the_command_prints(tmp_path, arguments):
     assert [line for line in shown if " ".join(line.split()) not in printed] == []
 
 
+def test_what_needs_no_simulation_is_told_of_a_body_whose_simulation_breaks_down(model, monkeypatch):
+    """The question after the inertia runs out of memory, as another one may run out of time."""
+
+    def endless(body, dts):
+        raise MemoryError
+
+    monkeypatch.setattr("dropspin.comparisons.diagnosis.study.QUESTIONS", (endless,))
+    done = dropspin("diagnose", "two.xml", "--body", "heavy", cwd=model, COLUMNS="200")
+    assert done.returncode == 3
+    why, head, *lines = done.stdout.splitlines()
+    assert why.startswith("heavy: ")
+    assert head.startswith("heavy: box, 0.1 kg")
+    assert [line for line in lines if line.startswith("Inertia, impossible: ")]
+    assert "1 body without a result" in done.stdout
+
+
 @pytest.mark.extended
 def test_mesh_is_a_solid_of_a_density(tmp_path):
     corners = [f"v {x} {y} {z}" for x in (0, 0.1) for y in (0, 0.2) for z in (0, 0.3)]

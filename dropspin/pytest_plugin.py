@@ -39,6 +39,8 @@ SUBJECTS = {
     "accepted asymptotic error": "accepted asymptotic",
 }
 """The prefix of the metric's name in a message, by the kind of a row, or, for accepted results, by the column `truth`."""
+QUESTIONS = ("inertia", "fall", "spin", "tumble", "impact", "rest", "slide", "roll", "friction", "file")
+"""The first words of rows of `dropspin diagnose`."""
 MARKER = "dropspin(*scenes, engine=None, dt=None): call the test once for each scene and engine, with the run as dropspin_result."
 
 Row = dict[str, Any]
@@ -335,15 +337,18 @@ def dropspin_model(pytestconfig: pytest.Config, tmp_path: Path) -> Callable[...,
 
     def diagnose(file: str | os.PathLike[str], *options: str, allowed: Iterable[str] = ()) -> list[Row]:
         __tracebackhide__ = True
+        names = {allowed} if isinstance(allowed, str) else set(allowed)
+        if unknown := names.difference(QUESTIONS):
+            pytest.fail(f"allowed: got {', '.join(sorted(unknown))}; rows begin with {', '.join(QUESTIONS)}", pytrace=False)
         runs, command = pytestconfig.stash[RUNS], [os.fspath(file), *options]
         done = runs.dropspin("diagnose", "-o", str(tmp_path / "diagnosis"), "--json", *command)
-        if done.returncode not in (0, 1):
+        if not done.stdout:
             pytest.fail(_error(done), pytrace=False)
         rows: list[Row] = json.loads(done.stdout)
-        names = {allowed} if isinstance(allowed, str) else set(allowed)
+        lines = [f"{row['body']}: {row['detail']}" for row in rows if done.returncode == 3 and row["question"] == "simulation"]
         findings = [row for row in rows if row["finding"] and row["question"] not in names]
-        if findings:
-            lines = [f"{row['body']}, {row['finding']}: {row['question']}, {row['quantity']}: {row['settings']}" for row in findings]
+        lines += [f"{row['body']}, {row['finding']}: {row['question']}, {row['quantity']}: {row['settings']}" for row in findings]
+        if lines:
             pytest.fail("\n".join([*lines, f"Reproduce: {shlex.join([NAME, 'diagnose', *command])}"]), pytrace=False)
         return rows
 

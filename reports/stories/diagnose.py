@@ -36,11 +36,11 @@ class Diagnosed(Study):
     diagnosis: Diagnosis
 
     def rows(self) -> Records:
-        """A row for each measured value and finding, with the places in the file where the settings are written."""
+        """A row for each measured value and finding, with the places in the file where settings are written, and for each breakdown."""
         rows = []
         for body in self.diagnosis.bodies:
             of_body = {"file": self.diagnosis.file, "body": body.name, "engine": body.engine, "version": body.version, "dt": body.dt}
-            for answer in body.answers:
+            for answer in (*body.answers, *(Answer("simulation", "breakdown", "", detail=why) for why in _breakdown(body))):
                 values = {name: value for name, value in asdict(answer).items() if name != "findings"}
                 rows += [{**of_body, **values, **_finding_cells(body, answer, finding)} for finding in answer.findings or [None]]
         return rows

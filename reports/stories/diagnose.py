@@ -249,8 +249,9 @@ def _statement(pair: tuple[Answer, Finding]) -> str:
 
 
 def _settings(body: BodyDiagnosis, names: Sequence[str]) -> list[str]:
+    """Settings in the words of the file; of one that the engine compiled of parts that dropspin does not follow, the name."""
     known = body.settings or {}
-    return [str(known[name]) for name in names if name in known]
+    return [str(known.get(name, f"{name} (compiled; its place in the file was not found)")) for name in names]
 
 
 def differences(bodies: Sequence[BodyDiagnosis]) -> Rows:

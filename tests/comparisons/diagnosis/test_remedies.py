@@ -1,13 +1,16 @@
 """Which settings a finding names, and what is tried."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from support.model_files import body_of, findings_of
 
 import dropspin as ds
 from dropspin.comparisons.diagnosis.answers import DECAY_TIME, Answer, Finding, judged
 from dropspin.comparisons.diagnosis.friction import _of_short_slide
+from dropspin.comparisons.diagnosis.landing import rest
 from dropspin.comparisons.diagnosis.remedies import answers_to
 from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis
@@ -46,6 +49,14 @@ def test_settings_without_effect_are_not_named_as_causes():
     written = {"cone": Setting('cone="pyramidal"'), "timestep": Setting('timestep="0.01"')}
     [sentence] = sentences(BodyDiagnosis("b", "MuJoCo", answers=(answer,), settings=written))
     assert sentence.startswith("Slide, engine: stopping distance is 0.8 m instead of 1 m: not removed by a change of cone=")
+
+
+def test_setting_of_a_replicate_is_named_without_a_line(tmp_path):
+    body = '<body name="b" pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .1" margin=".01"/></body>'
+    body = body_of(tmp_path, f'<replicate count="2" offset="1 0 0">{body}</replicate>', name="b0")
+    [(answer, finding)] = findings_of(body, rest)
+    [sentence] = sentences(BodyDiagnosis("b0", "MuJoCo", answers=(replace(answer, findings=(finding,)),), settings=body.facts.settings))
+    assert ": margin (compiled; its place in the file was not found). Remedy" in sentence
 
 
 @pytest.mark.parametrize(("left", "settings", "remedies"), [(0.04, ("cone",), 2), (0.09, ("timestep",), 1)])

@@ -188,10 +188,15 @@ class MuJoCoFile:
         return sorted(found, key=rank)
 
     def height_above(self, surface: int, own: Sequence[int]) -> float:
-        """The height of the centre of mass of the bodies of some geometries above a plane or a box [m]; infinite beside or below it."""
-        bodies = np.unique(self.model.geom_bodyid[own])
+        """The height of the top of some geometries above a plane or a box that is below the centre of mass of their bodies [m].
+
+        It is infinite if they are beside or below the plane or box.
+        """
+        bodies, down = np.unique(self.model.geom_bodyid[own]), self._down
         centre = np.average(self.data.xipos[bodies], axis=0, weights=self.model.body_mass[bodies] + LEAST)
-        return distance_to(self.model, self.data, surface, centre, self._down)
+        turned, boxes = down @ self.data.geom_xmat[own].reshape(-1, 3, 3), self.model.geom_aabb[own]
+        tops = self.data.geom_xpos[own] @ down + np.sum(turned * boxes[:, :3] - np.abs(turned) * boxes[:, 3:], axis=1)
+        return distance_to(self.model, self.data, surface, centre + (tops.min() - centre @ down) * down, down)
 
     @property
     def _down(self) -> Array:

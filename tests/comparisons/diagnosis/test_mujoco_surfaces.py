@@ -54,3 +54,4 @@ def test_part_that_hangs_beside_its_support_is_no_penetration(tmp_path):
     body = on(tmp_path, post, geom=f'<geom type="box" size=".2 .2 .01" pos="0 0 .01"/>{skirts}')
     depth = rest(body, ladder(body)[:1])[0]
     assert 0.0 < depth.measured < 1e-3
+    assert body.facts.unmodelled == []

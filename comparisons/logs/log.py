@@ -43,6 +43,8 @@ NEAR_UNIT = 0.05
 """Largest difference from 1 of the length of a quaternion; two digits round it by 0.01."""
 MOVES = 0.1
 """Share of a toss's largest step from which a body moves: below, rounding may repeat a row."""
+UNSURE = 0.5
+"""Range of the steps between frames, over the usual step, from which on a long step does not show that frames are missing."""
 OTHER_RATE = 2e-3
 """Relative difference of two rates that is none of rounding."""
 
@@ -274,7 +276,7 @@ def _uneven(toss: Toss) -> Iterator[Finding]:
     """Missing frames, and times that are not equally spaced beside them."""
     steps = np.diff(toss.t)
     missing, usual = missing_frames(steps), float(np.median(steps))
-    for frame in np.flatnonzero(missing):
+    for frame in np.flatnonzero(missing) if np.ptp(steps[missing == 0]) < UNSURE * usual else ():
         yield Finding("gap", float(missing[frame]), 0.0, toss.name, int(frame) + 1)
     if is_uneven(steps[missing == 0]):
         worst = int(np.argmax(np.where(missing, 0.0, np.abs(steps - usual))))

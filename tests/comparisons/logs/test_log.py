@@ -325,6 +325,12 @@ def facts(log):
     return [(fact.kind, fact.toss, fact.frame, round(fact.value, 6), round(fact.expected, 6)) for fact in log.irregularities]
 
 
+def test_long_steps_of_uneven_times_are_no_missing_frames(tmp_path):
+    steps = 0.01 * np.random.default_rng(1).uniform(0.4, 1.8, FRAMES - 1)
+    log = load_log(written(tmp_path, POSE | {"t": np.concatenate([[0.0], np.cumsum(steps)])}, {}))
+    assert {finding.kind for finding in log.irregularities} == {"jitter"}
+
+
 def test_repeated_rows_missing_frames_uneven_times_and_another_rate_are_facts(tmp_path):
     rows = np.delete(np.arange(FRAMES), [20, 21, 30])
     held = np.where((rows >= 10) & (rows < 13), 10, rows)

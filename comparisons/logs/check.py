@@ -123,6 +123,7 @@ def log_check(recording: Flights | Log | str | Path) -> Check:
     off = list(_of_offset(flights, values))
     if off:  # the tracked point of a body that turns fast about another point seems not to fly
         found = [finding for finding in found if finding.kind not in ("no flight", "late")]
+    found += [Finding("misread", toss=flight.toss.name, frame=frame) for flight in flights.found for frame in flight.misread]
     found += [*_of_scale(flights, drag), *off, *_of_inertia(flights, drag, values), *of_floor(flights, ALARM)]
     return replace(check, findings=tuple(found))
 

@@ -45,19 +45,22 @@ class Flight:
         toss: The toss.
         first: Its first frame.
         end: The frame after its last one.
+        misread: Frames of it whose orientations are wrong.
     """
 
     toss: Toss
     first: int
     end: int
+    misread: tuple[int, ...] = ()
 
     def __len__(self) -> int:
         return self.end - self.first
 
     @cached_property
     def rows(self) -> NDArray[np.intp]:
-        """Its frames, or `LONGEST` of them, with the first and the last one."""
-        return np.unique(np.linspace(self.first, self.end - 1, min(len(self), LONGEST)).round().astype(int))
+        """Its frames without those that are misread, or `LONGEST` of them, with the first and the last one."""
+        frames = np.linspace(self.first, self.end - 1, min(len(self), LONGEST)).round().astype(int)
+        return np.setdiff1d(frames, np.array(self.misread, dtype=int))
 
     @property
     def t(self) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, Flight, departures, falls, grown, positions
 from dropspin.comparisons.logs.log import Header, Log, Toss
 from dropspin.comparisons.logs.noise import Noise, Regression, end_of, regression
-from dropspin.comparisons.logs.rotors import Rotation, rotation, turn_by
+from dropspin.comparisons.logs.rotors import Rotation, misread, rotation, turn_by
 from dropspin.scenarios.ensemble import clearances
 from dropspin.scenarios.rotations import multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
@@ -117,7 +117,7 @@ def _start(flight: Flight, known: Array, rotor: Rotation, position_noise: Noise,
     for part, block in ((moved_covariance, (0, 6)), (turned_covariance, (3, 9))):
         rows = np.concatenate([np.arange(start, start + 3) for start in block])
         covariance[np.ix_(rows, rows)] = part
-    return Start(flight.toss, flight.first, flight.end - 1, state, covariance)
+    return Start(flight.toss, flight.first, int(flight.rows[-1]), state, covariance)
 
 
 def flights_of(log: Log, acceleration: Array) -> Flights | None:
@@ -130,9 +130,17 @@ def flights_of(log: Log, acceleration: Array) -> Flights | None:
         moving = regression(list(map(positions, found)))
         weights = iter(moving.weights)
         flights = [None if flight is None else grown(flight, moving, next(weights)) for flight in flights]
-    found = [flight for flight in flights if flight is not None]
-    rotations = tuple(rotation(flight, log.header.body.inertia_tensor) for flight in found)
-    return Flights(log, tuple(flights), regression(list(map(positions, found))), rotations, _turning(rotations))
+    inertia = log.header.body.inertia_tensor
+    rotors = [None if flight is None else _sound(rotation(flight, inertia)) for flight in flights]
+    rotations = tuple(rotor for rotor in rotors if rotor is not None)
+    moving = regression([positions(rotor.flight) for rotor in rotations])
+    return Flights(log, tuple(None if rotor is None else rotor.flight for rotor in rotors), moving, rotations, _turning(rotations))
+
+
+def _sound(rotor: Rotation) -> Rotation:
+    """The rotor of a flight without its wrong orientations."""
+    wrong = misread(rotor)
+    return rotation(replace(rotor.flight, misread=wrong), rotor.inertia) if wrong else rotor
 
 
 def _turning(rotations: Sequence[Rotation]) -> Regression:

@@ -7,7 +7,7 @@ import numpy as np
 
 from dropspin.comparisons.logs.flight import Flight
 from dropspin.comparisons.logs.noise import Samples
-from dropspin.scenarios.rotations import about, cross, multiply, rotate, rotation_vector
+from dropspin.scenarios.rotations import about, cross, length, multiply, rotate, rotation_vector
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.truths.free_rotor import free_rotor
 
@@ -15,6 +15,10 @@ TURN = 1e-4
 """Step of derivatives by a spin, as the angle by which it turns during the flight [rad], and by the logarithm of a moment of inertia."""
 ITERATIONS = 8
 """Of the fit of a rotor with the derivatives of its first guess, each of which leaves about a tenth of the error."""
+NEAREST, FEWEST_ROWS = 8, 7
+"""Frames beside another one with which its orientation is compared, and frames of a flight that are not left out."""
+MISREAD, SPIKE = 0.05, 5.0
+"""Difference of a wrong orientation from those beside it [rad], and its multiple of the median difference, at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +70,30 @@ class Rotation:
             ratios.append(rotation_vector(early, late) / (2.0 * TURN))
         measured = rotation_vector(self(t)[0], self.flight.toss.orientation[self.flight.rows])
         return Samples(t, measured, self.own_columns(t)[0], np.stack(ratios, axis=2))
+
+
+def misread(rotor: Rotation) -> tuple[int, ...]:
+    """The frames of a flight whose orientations are off the smooth difference of the others from its rotor."""
+    samples, kept = rotor.samples, np.ones(len(rotor.flight.rows), dtype=bool)
+    while kept.sum() > FEWEST_ROWS:
+        rows = np.flatnonzero(kept)
+        left, errors = _from_others(samples.t[rows], samples.values[rows])
+        worst = int(np.argmax(left / errors))
+        if left[worst] < MISREAD or left[worst] / errors[worst] < SPIKE * float(np.median(left / errors)):
+            break
+        kept[rows[worst]] = False
+    return tuple(rotor.flight.rows[~kept].tolist())
+
+
+def _from_others(t: Array, values: Array) -> tuple[Array, Array]:
+    """How far each vector is from the parabola through those beside it, and its standard error over that of a vector, shape (n,) each."""
+    count, width = len(t), min(NEAREST + 1, len(t))
+    near = np.clip(np.arange(count) - width // 2, 0, count - width)[:, np.newaxis] + np.arange(width)
+    is_other = near != np.arange(count)[:, np.newaxis]
+    times = (t[near] - t[:, np.newaxis]) * (count / t[-1])
+    weights = np.linalg.pinv(np.stack([is_other, times * is_other, times**2 * is_other], axis=2))[:, 0]
+    left = length(values - np.einsum("nw,nwk->nk", weights, values[near]))
+    return left, np.sqrt(1.0 + np.sum(weights**2, axis=1))
 
 
 def turn_by(vector: Array) -> Array:

@@ -410,6 +410,20 @@ def test_bodies_that_fly_below_the_floor_are_a_finding_without_rests() -> None:
     assert 1.5 < found.value < 2.5
 
 
+@pytest.mark.parametrize(("frame", "angle"), [(0, 0.1), (20, 1.2)])
+def test_a_wrong_orientation_is_named_and_changes_no_inertia(frame: int, angle: float) -> None:
+    log = made(1, 3, NOISE, durations=(0.3, 0.4)).log
+
+    def one_wrong(toss: Toss) -> Array:
+        turns = np.zeros((len(toss), 3))
+        turns[frame, 0] = angle * (toss.name == "1")
+        return turned(turns, toss.orientation)
+
+    check = log_check(changed(log, orientation=one_wrong))
+    assert [(found.kind, found.toss, found.frame) for found in check.findings] == [("misread", "1", frame)]
+    np.testing.assert_allclose(check.flights.turning.values, flights_of(log, np.array([0.0, -9.81, 0.0])).turning.values, atol=0.01)
+
+
 @pytest.mark.parametrize("speed", [0.0, 1.0])
 def test_a_body_that_rests_or_slides_does_not_fly(speed: float) -> None:
     """A deceleration along the floor is no gravity."""

@@ -144,12 +144,12 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     is_wrong = depth_error > noteworthy or moving > noteworthy
     finest_depth, finest_speed, _ = _at_rest(body, dts[-1]) if is_wrong else (depth, speed, tips)
     floats = facts.margin > 0.0 and -depth > noteworthy
-    of_depth = _of_error(facts, depth_error, abs(finest_depth - facts.rest_depth), noteworthy)
+    of_depth = _of_error(body, depth_error, abs(finest_depth - facts.rest_depth), noteworthy)
     if math.isinf(facts.rest_depth):
         endless = "and grows without end: a contact without stiffness holds no body"
         of_depth = (Finding("setting", facts.in_file(*OF_CONTACT), detail=endless),)
     of_depth = (Finding("setting", ("margin",)),) * floats + of_depth
-    of_speed = _of_error(facts, moving, finest_speed, noteworthy)
+    of_speed = _of_error(body, moving, finest_speed, noteworthy)
     return [
         *support,
         Answer("rest", "penetration", "m", measured=depth, in_force=facts.rest_depth, physical=0.0, findings=of_depth),
@@ -157,7 +157,7 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     ]
 
 
-def _of_error(facts: Facts, error: float, finest: float, noteworthy: float) -> tuple[Finding, ...]:
+def _of_error(body: LooseBody, error: float, finest: float, noteworthy: float) -> tuple[Finding, ...]:
     """The finding of an error that exceeds a limit, by what the error is at the finest time step; none if the error is not known.
 
     An error that the time step does not reduce is due to the contact, whose settings may be those of the file.
@@ -166,7 +166,7 @@ def _of_error(facts: Facts, error: float, finest: float, noteworthy: float) -> t
         return ()
     if finest < 0.6 * error:
         return (Finding("time step", ("timestep",)),)
-    acting = (*facts.unknown, *facts.in_file(*OF_CONTACT))
+    acting = (*body.facts.unknown, *body.causes.get("rest", ()), *body.facts.in_file(*OF_CONTACT))
     return (Finding("setting", acting) if acting else Finding("model", ("timestep",)),)
 
 

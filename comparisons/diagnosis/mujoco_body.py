@@ -56,8 +56,12 @@ REMEDIES: Mapping[str, Changes] = {
     "solimp": DEFAULT_CONTACT,
 }
 
-
-CAUSES = dict.fromkeys(("fall", "spin", "tumble"), ("integrator",)) | {"slide": ("cone", "impratio")}
+CAUSES: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(("fall", "spin", "tumble"), ("integrator",)),
+    **dict.fromkeys(("impact", "rest", "roll"), ()),
+    "slide": ("cone", "impratio"),
+}
+"""Settings that may change errors, by question."""
 
 
 class MuJoCoModel(MuJoCoFile):
@@ -87,8 +91,9 @@ class MuJoCoBody(LooseBody):
         self._touching = {geom: alone.in_force_of(geom) for geom in self._lowest}
         self._text = BodyText(alone.file, alone.head, alone.surface, self._touching)
         self.facts = self._facts()
-        contact = self.facts.in_file(*DEFAULT_CONTACT)
-        self.causes = CAUSES | {question: (*CAUSES.get(question, ()), *contact) for question in ("slide", "roll")}
+        contact, sleep = self.facts.in_file(*DEFAULT_CONTACT), ("sleep_tolerance",) * sleeps(self._model.opt)
+        of_contact = {"slide": contact, "roll": contact}
+        self.causes = {question: (*sleep, *acting, *of_contact.get(question, ())) for question, acting in CAUSES.items()}
 
     def changed(self, changes: Changes) -> LooseBody:
         return MuJoCoBody(self._name, self._alone.changed(changes))
@@ -149,7 +154,6 @@ class MuJoCoBody(LooseBody):
         raised = any(not np.array_equal(alone.clamped(pair), pair["solref"]) for pair in alone.pairs.values())
         drag, option = Drag(*alone.damping), self._model.opt
         unmodelled = {"frictionloss": self._model.dof_frictionloss.any(), "density": option.density, "viscosity": option.viscosity}
-        unmodelled["sleep_tolerance"] = sleeps(option)
         inside = 0.0 if surface is None or self._names[surface] == ADDED else self._start_inside(self._pose)
         is_beside = surface is not None and file.model.geom_type[surface] != PLANE and math.isinf(file.height_above(surface, alone.geoms))
         start = ["a start beside or below the surface"] * is_beside + [f"a start {inside:.3g} m inside the surface"] * (

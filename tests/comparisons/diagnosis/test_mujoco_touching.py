@@ -91,7 +91,8 @@ def test_body_that_does_not_fall_has_answers_that_say_so(tmp_path, gravcomp):
 def test_sleep_is_a_setting_with_a_remedy(tmp_path):
     flag = '<option sleep_tolerance="0.6"><flag sleep="enable"/></option>'
     body = body_of(tmp_path, FREE.format(LID), head=flag)
-    found = next(found for _, found in findings_of(body, fall))
-    assert (found.kind, body.facts.settings[found.settings[0]].text) == ("setting", 'sleep="enable"')
+    [(answer, found)] = findings_of(body, fall)
+    assert answer.in_force == pytest.approx(0.5 * 9.81)
+    assert (found.kind, [body.facts.settings[name].text for name in found.settings]) == ("setting", ['sleep="enable"'])
     assert found.remedies[0].value == pytest.approx(0.5 * 9.81, rel=3e-3)
     assert 'sleep_tolerance="0"' in found.remedies[0].text

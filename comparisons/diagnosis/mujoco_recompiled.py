@@ -1,8 +1,8 @@
 """A model file as MuJoCo compiles it without some of what changes masses and inertias."""
 
 import math
-from collections.abc import Mapping
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from functools import cache, cached_property
 from typing import Any
 
 import mujoco
@@ -17,9 +17,8 @@ NEUTRAL: Mapping[str, Any] = {
     "boundinertia": LEAST,
     "settotalmass": -1.0,
     "inertiafromgeom": mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO,
-    "balanceinertia": False,
 }
-"""Settings of the compiler that change masses and inertias of a file, with the values at which they change none."""
+"""Settings of the compiler that change masses and possible inertias of a file, with the values at which they change none."""
 
 
 class Recompiled:
@@ -32,17 +31,17 @@ class Recompiled:
     def __init__(self, spec: Any) -> None:
         self._spec = spec
 
-    def without(self, *settings: str, **others: Any) -> tuple[Any, Any] | None:
-        """With settings of the compiler at their neutral values, or at other ones."""
-        spec = self._spec.copy()
-        for name, value in ({name: NEUTRAL[name] for name in settings} | others).items():
-            setattr(spec.compiler, name, value)
-        return _compiled(spec)
-
     @cached_property
-    def unchanged(self) -> tuple[Any, Any] | None:
-        """Before the compiler changes masses and inertias of the file; impossible ones are balanced."""
-        return self.without(*NEUTRAL, balanceinertia=True)
+    def without(self) -> Callable[..., tuple[Any, Any] | None]:
+        """The function from settings of the compiler to the model without their effect, made once; impossible inertias are balanced."""
+        return cache(self._without)
+
+    def _without(self, *settings: str) -> tuple[Any, Any] | None:
+        spec = self._spec.copy()
+        spec.compiler.balanceinertia = True
+        for name in settings:
+            setattr(spec.compiler, name, NEUTRAL[name])
+        return _compiled(spec)
 
     @cached_property
     def exact(self) -> tuple[Any, Any] | None:

@@ -30,7 +30,6 @@ IN_FORCE |= {"inertia_scaling": 1.0} | dict.fromkeys(("stiffness", "damping", "f
 """The settings of inertia and contact in a URDF file, which MuJoCo does not read, and what it has instead."""
 FURTHER = {"torsional": (1, 4, 0.005), "rolling": (2, 6, 1e-4)}
 """The place of a coefficient of friction, the dimensions of contacts that have it, and its default."""
-
 PER_METRE = {"cm": 100.0, "mm": 1000.0}
 """Units of length in which models are written by mistake."""
 
@@ -63,11 +62,16 @@ class BodyText:
     def written(self) -> MassProperties | None:
         """What the file says of the body and of what is welded to it, with moments that MuJoCo would balance as they are written."""
         tensor = self._tensor
-        found = self._properties(self._file.recompiled.unchanged)
+        found = self._unchanged
         if found is None or tensor is None:
             return found
         wanted, has = np.linalg.eigvalsh(tensor), np.linalg.eigvalsh(found.inertia)
         return found._replace(inertia=tensor) if _differ(wanted, has) else found
+
+    @property
+    def _unchanged(self) -> MassProperties | None:
+        """Those that the file has before the compiler changes them; impossible ones are balanced."""
+        return self._properties(self._file.recompiled.without(*NEUTRAL))
 
     def _properties(self, compiled: tuple[Any, Any] | None) -> MassProperties | None:
         """Those of the body and of what is welded to it in a compiled model with its data; None without mass or without a model."""
@@ -274,15 +278,20 @@ class BodyText:
 
     def _changed(self, name: str, made: str) -> tuple[str, Setting, str]:
         """A quantity that the compiler changes, with what is written, and the settings of which each alone makes a difference."""
-        has, why = getattr(self._properties(self._file.compiled), name), []
-        for setting in NEUTRAL:
-            words = option_setting(self._file.source, "compiler", setting, "")
-            other = self._properties(self._file.recompiled.without(setting)) if words.file else None
-            why += [words] * bool(words.file and (other is None or _differ(getattr(other, name), has)))
+        found = {setting: option_setting(self._file.source, "compiler", setting, "") for setting in (*NEUTRAL, "balanceinertia")}
+        why = [words for setting, words in found.items() if words.file and self._acts(setting, name)]
         written = self.settings.get(name)
         if written is None:
             return name, why[0] if why else Setting(name), made
         return name, written, made + (f", by {', '.join(map(str, why))}" if why else "")
+
+    def _acts(self, setting: str, name: str) -> bool:
+        """Whether a setting of the compiler alone changes a quantity."""
+        if setting == "balanceinertia":
+            without, has = self.written, self._unchanged
+        else:
+            without, has = (self._properties(one) for one in (self._file.recompiled.without(setting), self._file.compiled))
+        return without is not None and has is not None and _differ(getattr(without, name), getattr(has, name))
 
 
 def _differ(wanted: Any, has: Any) -> bool:

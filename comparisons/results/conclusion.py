@@ -9,8 +9,10 @@ import pandas as pd
 
 from dropspin.comparisons.judging.convergence import JUMPING
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS
+from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.results.results import Results, relative_sizes
 from dropspin.scenarios import Scenario
+from dropspin.scenarios.truths import exact_solution
 
 WITHIN = 0.01
 """The share of its scale that an error may have, unless another one is asked for."""
@@ -22,7 +24,9 @@ ENOUGH = 3
 
 @dataclass(frozen=True)
 class Answer:
-    """What a run says about one engine and one metric. Its scenes are those in which any engine has an error in this metric.
+    """What a run says about one engine and one metric.
+
+    Its scenes are those in which any engine has an error in this metric, and those in which it applies and every engine broke down.
 
     Attributes:
         metric: The metric.
@@ -100,13 +104,16 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     keys = ["engine", "scene", "dt"]
     steps = tried[keys].assign(default=np.where(is_broken[tried.index], "beyond", "undecided")).drop_duplicates(keys)
     declined = table[table["verdict"] == "declined"].drop_duplicates(["engine", "scene"])
+    lost_scenes = set(table.loc[is_broken, "scene"]) - set(table.loc[is_exact, "scene"]) - set(results.recorded)
+    truths = {name: (results.scenes[name], exact_solution(results.scenes[name])) for name in sorted(lost_scenes)}
     answers = []
     for metric in QUESTIONS:
         rows = found.loc[found["metric"] == metric, [*keys, "state", "size", "cost"]]
-        tested = steps[steps["scene"].isin(rows["scene"])].merge(rows, how="left", on=keys)
+        scenes = {*rows["scene"], *(name for name, known in truths.items() if METRICS[metric].applies(*known))}
+        tested = steps[steps["scene"].isin(scenes)].merge(rows, how="left", on=keys)
         tested["state"] = tested["state"].fillna(tested["default"])
         for engine in results.engines:
-            series, scenes = tested[tested["engine"] == engine], rows["scene"].unique()
+            series = tested[tested["engine"] == engine]
             if len(series):
                 absent = declined[(declined["engine"] == engine) & declined["scene"].isin(scenes)]
                 answers.append(_answer(metric, engine, len(scenes), len(absent), series, results.scenes))

@@ -341,3 +341,15 @@ def test_body_that_stays_down_has_no_bounce_height_error(scene, dt):
     assert measure(scene, sunk)["bounce_height_error"] == pytest.approx(-1e-3, abs=1e-12)
     shorter = Comparison(scene, sunk, exact[:-2], tuple(event.time for event in truth_for(scene).events))  # as of a later start phase
     assert METRICS["bounce_height_error"].average([shorter]).value == pytest.approx(-1e-3, abs=1e-12)
+
+
+def test_energy_after_an_impact_counts_though_the_flight_before_is_much_longer():
+    """A ball that rebounds with 0.15 flies for 0.3 times as long as it fell."""
+    scene = dropped(restitution=0.15)
+    truth = truth_for(scene)
+    exact = truth(np.arange(0.0, 1.0, 1e-3))
+    first, second = (event.time for event in truth.events[:2])
+    states = exact.states.copy()
+    states[(exact.t > first) & (exact.t < second), 7:10] *= 1.5
+    case = Comparison.with_truth(scene, Trajectory.from_states(exact.t, states, 0.0), truth)
+    assert METRICS["energy_error"].value([case]) > 0.005

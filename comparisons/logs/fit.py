@@ -17,8 +17,9 @@ from dropspin.comparisons.logs.log import Log
 from dropspin.comparisons.logs.replay import flights_in, of_each_engine
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.processes import FIVE_MINUTES, EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown
+from dropspin.comparisons.running.resources import FIVE_MINUTES, ResourceLimits
 from dropspin.scenarios.state import ORIENTATION, POSITION
 
 ANY_ENGINE = "any engine"

@@ -13,7 +13,6 @@ import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from multiprocessing import get_all_start_methods, get_context
 from types import TracebackType
 from typing import Self, TypeVar, TypeVarTuple
@@ -27,45 +26,19 @@ from dropspin.comparisons.running.engine_process import PROCESSES, call, memory_
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.progress import OnSimulations
 from dropspin.comparisons.running.recording import Breakdown
+from dropspin.comparisons.running.resources import GIB, ResourceLimits
 from dropspin.scenarios import DropspinError
 
 Given = TypeVarTuple("Given")
 Result = TypeVar("Result")
 
 POLL, GRACE = 0.5, 2.0  # s, between checks of a process, and for the pool to report its end
-GIB = 2**30  # bytes
-MOST_SECONDS, MOST_BYTES = 1e7, 2**60
 NEAR_LIMIT = 0.5
 """Share of the memory limit above which a crash mentions it."""
 WALL_TIME_FACTOR = 10.0
 """Wall time allowed over processor time allowed: an engine that sleeps forever uses no processor time."""
 COMPILATION = 600.0
 """Processor time allowed for compiling, beyond that for the work [s], of an engine that compiles."""
-
-
-@dataclass(frozen=True)
-class ResourceLimits:
-    """The processor time and memory that an engine may use for one scene at one time step, including start phases and ensemble.
-
-    Attributes:
-        processor_time: Processor time [s]. The wall time may be ten times as long.
-        memory: Memory [bytes] in addition to that of the process at its start.
-
-    Raises:
-        DropspinError: A limit is not positive, or too large for the system.
-    """
-
-    processor_time: float = 300.0
-    memory: int = 8 * GIB
-
-    def __post_init__(self) -> None:
-        for name, value, most in (("processor_time", self.processor_time, MOST_SECONDS), ("memory", self.memory, MOST_BYTES)):
-            if not 0.0 < value <= most:
-                raise DropspinError(f"{name}: got {value:g}; give a number above 0 and at most {most:g}.")
-
-
-ONE_MINUTE, FIVE_MINUTES = ResourceLimits(processor_time=60.0), ResourceLimits()
-"""The defaults: for a few simulations, and for a scene with all start phases."""
 
 
 class Closed(Exception):

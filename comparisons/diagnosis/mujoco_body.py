@@ -12,6 +12,7 @@ from mujoco import rollout
 from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
+from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of
 from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ENUMERATIONS, GEOM, OPTIONS, PLANE, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
@@ -160,7 +161,7 @@ class MuJoCoBody(LooseBody):
             inside > DEEP * self._model.stat.extent
         )
         tilted = [f"a gravity {off:.3g}° from the inward normal of the surface"] * (off > LEVEL)
-        every = {(0.0, 0.0) if one["condim"] == 1 else tuple(one["friction"][[1, 0]].tolist()) for one in self._touching.values()}
+        every = {friction_of(one) for one in self._touching.values()}
         frictions = (0.0, 0.0) if touching is None else next(iter(every)) if len(every) == 1 else (math.nan, math.nan)
         names = ", ".join(self._names[geom] for geom in self._touching)
         several = [f"a slide on geometries of different friction ({names})"] * (len(every) > 1)

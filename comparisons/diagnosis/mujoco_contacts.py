@@ -31,6 +31,11 @@ def contact_of(model: Any, first: int, second: int) -> dict[str, Any] | None:
     } | overrides(model)
 
 
+def friction_of(contact: dict[str, Any]) -> tuple[float, float]:
+    """The coefficients of sliding of a contact, in its second and first direction; 0 without friction."""
+    return (0.0, 0.0) if contact["condim"] == 1 else (float(contact["friction"][1]), float(contact["friction"][0]))
+
+
 def overrides(model: Any) -> dict[str, Any]:
     """The settings that all contacts have if the flag `override` is set."""
     option = model.opt

@@ -12,10 +12,10 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, Answer, Finding
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble, worst_tumble
-from dropspin.comparisons.diagnosis.friction import creep, roll, slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.remedies import Question, Targets, answers_to
+from dropspin.comparisons.diagnosis.sliding import creep, roll, slide
 from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.running.entries import present_entry

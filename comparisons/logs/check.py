@@ -20,7 +20,8 @@ from dropspin.comparisons.logs.flight import (
     positions,
 )
 from dropspin.comparisons.logs.flights import Flights
-from dropspin.comparisons.logs.log import LENGTHS, TIMES, UPRIGHT, Cause, Finding, Header, Log, load_log
+from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
+from dropspin.comparisons.logs.log import Cause, Finding, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
 from dropspin.comparisons.logs.recorded import of_floor, of_frames, of_quaternions, of_rates, orders_of_axes
 from dropspin.comparisons.logs.rest import rests

@@ -20,8 +20,9 @@ from dropspin.comparisons.logs.errors import KINDS, Kind, body_length, errors
 from dropspin.comparisons.logs.fit import LogFit
 from dropspin.comparisons.logs.flight import OFFSET
 from dropspin.comparisons.logs.flights import Flights, Start
+from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.intervals import groups, interval_of_share, intervals_of_means
-from dropspin.comparisons.logs.log import Header, Log
+from dropspin.comparisons.logs.log import Log
 from dropspin.comparisons.logs.replay import (
     Launches,
     flights_in,

@@ -8,7 +8,8 @@ import numpy as np
 
 from dropspin.comparisons.logs.flight import ACCELERATION, accelerations, is_near, noise_of, runs, standard_error, window_size
 from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, flights_of, heights
-from dropspin.comparisons.logs.log import LENGTHS, TIMES, Log
+from dropspin.comparisons.logs.header import LENGTHS, TIMES
+from dropspin.comparisons.logs.log import Log
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.state import Array
 

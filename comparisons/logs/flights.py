@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, Flight, departures, falls, grown, positions
-from dropspin.comparisons.logs.log import Header, Log, Toss
+from dropspin.comparisons.logs.header import Header
+from dropspin.comparisons.logs.log import Log, Toss
 from dropspin.comparisons.logs.noise import Noise, Regression, end_of, regression
 from dropspin.comparisons.logs.rotors import Rotation, misread, rotation, turn_by
 from dropspin.scenarios.ensemble import clearances

@@ -9,7 +9,8 @@ import numpy as np
 
 from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, SURPRISING, Flight, noise_of, surprise, window_size
 from dropspin.comparisons.logs.flights import Flights, highest
-from dropspin.comparisons.logs.log import UPRIGHT, Cause, Finding, Header, Log, Toss
+from dropspin.comparisons.logs.header import UPRIGHT, Header
+from dropspin.comparisons.logs.log import Cause, Finding, Log, Toss
 from dropspin.comparisons.logs.noise import Noise
 from dropspin.comparisons.logs.rest import level_share, rests
 from dropspin.comparisons.logs.rotors import rotation

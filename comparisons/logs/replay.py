@@ -9,8 +9,9 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.logs.flights import Flights, Start, flights_of
+from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.intervals import FEWEST
-from dropspin.comparisons.logs.log import Header, Log, load_log
+from dropspin.comparisons.logs.log import Log, load_log
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.processes import EngineProcesses

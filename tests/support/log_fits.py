@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dropspin.comparisons.logs.flights import Flights, Start
-from dropspin.comparisons.logs.log import Header, Log, Toss
+from dropspin.comparisons.logs.header import Header
+from dropspin.comparisons.logs.log import Log, Toss
 from dropspin.comparisons.logs.noise import Noise, Regression
 from dropspin.comparisons.logs.replay import STEPS_PER_FRAME, Launches, poses, scene_of
 from dropspin.comparisons.running.entries import engine_entry

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.logs.log import Header, Log, Toss
+from dropspin.comparisons.logs.header import Header
+from dropspin.comparisons.logs.log import Log, Toss
 from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.truths.free_rotor import free_rotor

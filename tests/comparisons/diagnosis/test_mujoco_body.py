@@ -8,11 +8,11 @@ from support.model_files import FREE, PLANE, body_of, by_quantity, findings_of, 
 
 from dropspin.comparisons.diagnosis.answers import REBOUND
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble, worst_tumble
-from dropspin.comparisons.diagnosis.friction import slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
 from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
+from dropspin.comparisons.diagnosis.sliding import slide
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.state import POSITION, UP
 from dropspin.scenarios.truths.settings import fall as damped_fall

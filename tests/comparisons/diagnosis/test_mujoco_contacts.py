@@ -4,10 +4,10 @@ import pytest
 from support.model_files import FREE, body_of, findings_of, ladder
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, MOVES, REBOUND, Answer
-from dropspin.comparisons.diagnosis.friction import creep, roll, slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
+from dropspin.comparisons.diagnosis.sliding import creep, roll, slide
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis, Diagnosis, diagnose
 from dropspin.scenarios import DropspinError
 

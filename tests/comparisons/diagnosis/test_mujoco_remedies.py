@@ -3,8 +3,8 @@
 import pytest
 from support.model_files import FREE, body_of, findings_of
 
-from dropspin.comparisons.diagnosis.friction import roll, slide
 from dropspin.comparisons.diagnosis.remedies import answers_to
+from dropspin.comparisons.diagnosis.sliding import roll, slide
 
 BOX = '<geom type="box" size=".1 .1 .1" mass="1" {}/>'
 

@@ -9,11 +9,11 @@ from support.model_files import FREE, body_of, by_quantity, findings_of, ladder
 
 from dropspin.comparisons.diagnosis.answers import DECAY_TIME, REBOUND
 from dropspin.comparisons.diagnosis.flight import fall, spin
-from dropspin.comparisons.diagnosis.friction import slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import IMPACTS, impact, rest
 from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
 from dropspin.comparisons.diagnosis.remedies import answers_to
+from dropspin.comparisons.diagnosis.sliding import slide
 from dropspin.scenarios.truths.settings import time_constant
 
 HALF = (0.1, 0.05, 0.03)

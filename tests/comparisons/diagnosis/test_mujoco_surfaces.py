@@ -3,9 +3,9 @@
 import pytest
 from support.model_files import ladder
 
-from dropspin.comparisons.diagnosis.friction import roll
 from dropspin.comparisons.diagnosis.landing import rest
 from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
+from dropspin.comparisons.diagnosis.sliding import roll
 
 BOX = '<geom type="box" size=".1 .1 .04"/>'
 FLOOR = '<geom name="floor" type="plane" size="0 0 1"/>'

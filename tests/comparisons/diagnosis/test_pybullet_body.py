@@ -12,11 +12,11 @@ from support.urdf_files import BALL, BOX, body, joint, link, model, two_links
 from dropspin.comparisons.diagnosis import landing
 from dropspin.comparisons.diagnosis.answers import REBOUND
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble
-from dropspin.comparisons.diagnosis.friction import creep, roll, slide
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.pybullet_server import server
 from dropspin.comparisons.diagnosis.remedies import answers_to
+from dropspin.comparisons.diagnosis.sliding import creep, roll, slide
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import UnknownName
 from dropspin.scenarios.rotations import rotate, unrotate

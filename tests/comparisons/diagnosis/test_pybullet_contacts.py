@@ -8,8 +8,8 @@ pytest.importorskip("pybullet", exc_type=ImportError)
 
 from support.urdf_files import BOX, body, joint, link, two_links
 
-from dropspin.comparisons.diagnosis.friction import slide
 from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
+from dropspin.comparisons.diagnosis.sliding import slide
 
 STEP = 1.0 / 240.0
 

@@ -9,9 +9,9 @@ from support.model_files import body_of, findings_of
 
 import dropspin as ds
 from dropspin.comparisons.diagnosis.answers import DECAY_TIME, Answer, Finding, judged
-from dropspin.comparisons.diagnosis.friction import _of_short_slide
 from dropspin.comparisons.diagnosis.landing import rest
 from dropspin.comparisons.diagnosis.remedies import answers_to
+from dropspin.comparisons.diagnosis.sliding import _of_short_slide
 from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis
 from dropspin.reports.stories.diagnose import sentences

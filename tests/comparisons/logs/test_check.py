@@ -12,7 +12,8 @@ from dropspin.comparisons.logs import check as checks
 from dropspin.comparisons.logs.check import CENTRES, RATIOS, Check, log_check
 from dropspin.comparisons.logs.flight import Flight
 from dropspin.comparisons.logs.flights import flights_of
-from dropspin.comparisons.logs.log import Finding, Header, Log, Toss, load_log
+from dropspin.comparisons.logs.header import Header
+from dropspin.comparisons.logs.log import Finding, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression
 from dropspin.comparisons.logs.recorded import of_frames, of_rates
 from dropspin.scenarios.errors import DropspinError

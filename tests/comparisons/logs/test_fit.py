@@ -9,7 +9,8 @@ from dropspin.comparisons.logs import fit as log_fits
 from dropspin.comparisons.logs.fit import log_fit
 from dropspin.comparisons.logs.grids import Profile, problem_of
 from dropspin.comparisons.logs.grids import _refined as refined_grid
-from dropspin.comparisons.logs.log import Header, Log, Toss
+from dropspin.comparisons.logs.header import Header
+from dropspin.comparisons.logs.log import Log, Toss
 from dropspin.scenarios.variations import with_values
 
 

@@ -12,7 +12,8 @@ import tomlkit
 from scipy.spatial.transform import Rotation
 
 from dropspin.comparisons.logs import columns as columns_module
-from dropspin.comparisons.logs.log import LENGTHS, TIMES, load_log
+from dropspin.comparisons.logs.header import LENGTHS, TIMES
+from dropspin.comparisons.logs.log import load_log
 from dropspin.scenarios import DropspinError
 
 BODY = {"shape": "box", "half_extents": [0.05, 0.05, 0.05], "mass": 1.0}

@@ -184,6 +184,17 @@ class Comparison:
             inner.append(held)
         return inner
 
+    @property
+    def flights_with_impact(self) -> list[Rows]:
+        """The flights, among them the one after the first impact if there is an impact.
+
+        Raises:
+            Unresolved: That flight is too short.
+        """
+        if self.impacts and len(self.flights) < 2:
+            raise Unresolved(f"the flight after the impact lasts less than {SHORTEST_FLIGHT} steps of {self.dt:g} s or a fifth of the fall")
+        return self.flights
+
     @cached_property
     def greatest_apexes(self) -> tuple[float, float] | None:
         """The greatest apex height of the motion after its first contact, and that of the exact body after its first impact [m].

@@ -92,9 +92,7 @@ def bounce_height_error(case: Comparison) -> float:
     """
     if (apexes := case.greatest_apexes) is not None:
         return (apexes[0] - apexes[1]) / case.clearance
-    if len(case.flights) < 2:
-        raise Unresolved(f"the flight after the impact is too short for steps of {case.dt:g} s")
-    rows = case.flights[1]
+    rows = case.flights_with_impact[1]
     actual, exact = (apex(case.scene, motion[rows]) for motion in (case.compared, case.exact))
     return float(np.mean(actual - exact)) / case.clearance
 
@@ -281,9 +279,9 @@ def _largest(values: Array) -> float:
 
 def _largest_of_each_flight(values: Array, case: Comparison) -> Array:
     """The largest value in each flight, of values that are not negative, shape (flights,)."""
-    return np.array([values[rows].max() for rows in case.flights])
+    return np.array([values[rows].max() for rows in case.flights_with_impact])
 
 
 def _extremes_of_each_flight(values: Array, case: Comparison) -> Array:
     """The largest and the smallest value in each flight, shape (flights, 2), which may converge with different orders."""
-    return np.array([(values[rows].max(), values[rows].min()) for rows in case.flights])
+    return np.array([(values[rows].max(), values[rows].min()) for rows in case.flights_with_impact])

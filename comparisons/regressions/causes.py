@@ -72,8 +72,7 @@ def causes(results: Results, engine: str) -> Causes:
     scenes = [(results.scenes[str(name)], rows.to_dict("records")) for name, rows in judged.groupby("scene")]
     scenes.sort(key=lambda scene: all(row["verdict"] != "failed" for row in scene[1]))  # those that fail exclude most causes
     widths = (failed["upper"] - failed["lower"]) / failed["value"].abs()
-    narrowest = failed["scene"].iloc[int(widths.argmin())]
-    leading = failed[failed["scene"] == narrowest]
+    narrowest = failed.loc[widths.sort_values().index].groupby("scene", sort=False)  # first the scene whose sizes are the most precise
 
     def holds(fault: FaultModel) -> bool:
         count = 0
@@ -86,7 +85,8 @@ def causes(results: Results, engine: str) -> Causes:
 
     parameters = []
     for parameter in PARAMETERS:
-        sizes = [size for size in _sizes(results.scenes[str(narrowest)], parameter, leading, dt) if holds(_with(parameter, size))]
+        found = (list(_sizes(results.scenes[str(name)], parameter, rows, dt)) for name, rows in narrowest)
+        sizes = [size for size in next(filter(None, found), []) if holds(_with(parameter, size))]
         parameters += [WrongParameter(parameter, sizes[0], len(sizes) == 1)] if sizes else []
     faults: dict[object, FaultModel] = {}  # the first one of those that are the same in all of these scenes
     for fault in FAULT_MODELS:

@@ -5,7 +5,7 @@ import pytest
 from support import engines as made
 from support.detection_power import FAULTS, faulty_engine
 from support.fault_suite import FAULTS as PLANTED
-from support.fault_suite import Made, with_body, with_gravity, with_restitution
+from support.fault_suite import Made, with_body, with_damping, with_gravity, with_restitution
 from support.releases import TODAY, WithoutGyroscopicTerm, relabelled
 
 from dropspin.comparisons.regressions.baseline import Baseline
@@ -129,6 +129,15 @@ def test_known_fault_is_named(title):
         "additional angular damping of 1e-3 1/s in free flight": "angular damping 0.001 1/s too high",
     }
     assert words[title] in consistent_with(TITLED[title], "fall-spin", "spin-asymmetric", "drop-ball-backspin")
+
+
+def test_parameter_that_the_scene_of_the_narrowest_interval_cannot_have_is_named():
+    """The ball falls above a floor, where no exact solution has damping; its interval is the narrowest."""
+    damped = Made(title="damped", change=lambda scene: with_damping(linear=1e-3)(scene.model_copy(update={"floor": None})))
+    fall = lasting("drop-ball", 0.4).model_copy(update={"expect": ()})
+    results = run([fall, lasting("fall-spin", 0.1)], damped, STEPS)
+    [cause] = causes(results, "damped").parameters
+    assert (cause.parameter.name, cause.parameter.unit, cause.size) == ("linear damping", "1/s", pytest.approx(1e-3, rel=1e-3))
 
 
 def test_fault_without_an_effect_is_no_cause():

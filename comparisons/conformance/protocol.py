@@ -103,7 +103,7 @@ def _verify_built(engine: Engine, scene: Scenario) -> bool:
         except BuildMismatch as error:
             raise CheckFailed(_start_explained(engine, scene, state) or str(error)) from None
         verify_build(engine, scene, simulation, DT)
-        verified_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
+        verified_record(simulation.record(A_FEW_STEPS, 1), 1 + A_FEW_STEPS)
         has_built = simulation.as_built() is not None
     written = [name for name, values in arrays.items() if not np.array_equal(values, before[name])]
     if written:
@@ -125,16 +125,16 @@ def check_record(engine: Engine) -> str:
     """`record` and `advance` take the same steps."""
     scene = accepted_scene(engine)
     with engine.prepare(scene, DT) as simulation:
-        rows = verified_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
+        rows = verified_record(simulation.record(A_FEW_STEPS, 1), 1 + A_FEW_STEPS)
         end = simulation.state().copy()
     with engine.prepare(scene, DT) as simulation:
-        sparse = verified_record(simulation.record(A_FEW_STEPS, every=SEVERAL), 1 + A_FEW_STEPS // SEVERAL)
+        sparse = verified_record(simulation.record(A_FEW_STEPS, SEVERAL), 1 + A_FEW_STEPS // SEVERAL)
     with engine.prepare(scene, DT) as simulation:
         one_by_one = [simulation.state().copy()]
         for _ in range(A_FEW_STEPS):
             simulation.advance(1)
             one_by_one.append(simulation.state().copy())
-        again = verified_record(simulation.record(SEVERAL), 1 + SEVERAL)
+        again = verified_record(simulation.record(SEVERAL, 1), 1 + SEVERAL)
     stepped = np.array(one_by_one)
     together = state_after(engine, scene, [SEVERAL])
     _verify_equal(together, stepped[SEVERAL], f"advance({SEVERAL}) differs from {SEVERAL} calls of advance(1)")

@@ -110,13 +110,13 @@ def _is_verified(engine: Engine, scene: Scenario, size: Size) -> bool:
 def _verify_batches(engine: Engine, members: Sequence[Scenario], size: Size, first: BatchSimulation, second: BatchSimulation) -> None:
     """Compare three simulations of a batch with single ones, and the batch with another of the same simulations."""
     count = len(members)
-    rows = verified_batch(first.record(A_FEW_STEPS), count, 1 + A_FEW_STEPS)
+    rows = verified_batch(first.record(A_FEW_STEPS, 1), count, 1 + A_FEW_STEPS)
     verify_starts(engine, members, rows[:, 0])
     for number in sorted({0, count // 2, count - 1}):
         _verify_single(engine, members[number], size.dt, rows[number], first.velocity_lag, number)
     before = rows.copy()
     end = _advanced(first, size.long, count)
-    more = verified_batch(first.record(A_FEW_STEPS), count, 1 + A_FEW_STEPS)
+    more = verified_batch(first.record(A_FEW_STEPS, 1), count, 1 + A_FEW_STEPS)
     if not np.array_equal(rows, before):
         raise CheckFailed("record returns memory that later steps overwrite; return a copy")
     calls = np.stack([_advanced(second, PIECE, count) for _ in range((A_FEW_STEPS + size.long) // PIECE)], axis=1)

@@ -111,7 +111,7 @@ def record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_
         lag = simulation.velocity_lag
         limitations = verified_limitations(simulation.known_limitations)
         if extra_steps and np.isfinite(states[-1]).all():
-            states = np.concatenate([states, verified_record(simulation.record(extra_steps), 1 + extra_steps)[1:]])
+            states = np.concatenate([states, verified_record(simulation.record(extra_steps, 1), 1 + extra_steps)[1:]])
     times = dt * every * np.arange(1 + steps // every, dtype=float)
     later = times[-1] + dt * np.arange(1, 1 + len(states) - len(times), dtype=float)
     return Recording(Trajectory.from_states(np.concatenate([times, later]), states, lag), limitations, settings, seconds)
@@ -148,7 +148,7 @@ def record_batch(
     steps, size = members[0].steps(dt), len(members)
     with batch:
         start = time.perf_counter()
-        states = verified_batch(batch.record(steps), size, steps + 1)
+        states = verified_batch(batch.record(steps, 1), size, steps + 1)
         seconds = (time.perf_counter() - start) / size
         lag = verified_lag(batch.velocity_lag, dt)
         met = [verified_limitations(batch.limitations_of(*of_one)) for of_one in zip(members, states, strict=True)] if limitations else []

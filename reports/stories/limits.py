@@ -103,23 +103,34 @@ def _range(scan: AxisScan, nominal: str | None) -> dict[str, str]:
     if ends is None:
         base = f"{_mode(scan.nominal)} at the nominal value, {scan.base:.4g}"
         return none | {"beyond": f"{base}; sound at {sound} of {count} tested values"}
-    first, last = ends
     least, most = (f"{points[number].value:.4g}" for number in ends)
-    outside = [f"{_mode(points[number])} at {points[number].value:.4g}" for number in (first - 1, last + 1) if 0 <= number < count]
+    outside = [f"{_mode(point)} at {point.value:.4g}" for point in _outside(scan)]
     if scan.axis.invariant and nominal:
         same = f"at all {count} tested values" if sound == count else f"from {least} to {most}"
         return none | {"beyond": "; ".join([f"{nominal} at the nominal value; the same motion {same}", *outside])}
     if not outside:
         outside = [f"not tested; {'the same motion' if scan.axis.invariant else 'sound'} at all {count} tested values"]
     elif len(outside) == 1:
-        outside.append(f"no {'smaller' if first == 0 else 'larger'} value tested")
+        outside.append(f"no {'smaller' if ends[0] == 0 else 'larger'} value tested")
     return {"sound from": least, "to": most, "beyond": "; ".join(outside)}
 
 
+def _outside(scan: AxisScan) -> list[ScanPoint]:
+    """The neighbours of the sound range: those tested values at which it ends."""
+    first, last = scan.sound_range or (0, len(scan.points))
+    return [scan.points[number] for number in (first - 1, last + 1) if 0 <= number < len(scan.points)]
+
+
 def sentences(study: RobustnessStudy) -> list[str]:
-    """Sentences on engines that are not sound at the nominal values, with their errors, and on engines left out."""
+    """Sentences on engines that are not sound at the nominal values, on crashes beyond a sound range, and on engines left out."""
     failing = [(engine, points) for engine, points in study.refinements.items() if points[0].mode != "sound"]
-    return [_refinement(engine, points) for engine, points in failing] + left_out(study.left_out)
+    crashes = [
+        f"{scan.engine} crashed at {point.value:.4g} on the axis {scan.axis.label}: {point.diagnosis.message}."
+        for scan in study.scans
+        for point in _outside(scan)
+        if point.mode == "crashed"
+    ]
+    return [_refinement(engine, points) for engine, points in failing] + crashes + left_out(study.left_out)
 
 
 def _refinement(engine: str, points: Sequence[ScanPoint]) -> str:

@@ -25,7 +25,7 @@ class ExactSimulation(Simulation):
     def state(self):
         return self._states(np.array([self._step]))[0]
 
-    def record(self, steps, every=1):
+    def record(self, steps, every):  # no default, because dropspin gives both
         rows = self._states(self._step + every * np.arange(1 + steps // every))
         self._step += steps
         return rows
@@ -64,7 +64,7 @@ class Together(BatchSimulation):
     def states(self):
         return np.array([simulation.state() for simulation in self._simulations])
 
-    def record(self, steps, every=1):
+    def record(self, steps, every):  # no default, because dropspin gives both
         return self._change(np.array([simulation.record(steps, every) for simulation in self._simulations]))
 
 

@@ -115,7 +115,7 @@ class Short(made.Exact):
 
     def prepare(self, scene, dt):
         simulation = made.ExactSimulation(scene, dt)
-        simulation.record = lambda steps, every=1: made.ExactSimulation(scene, dt).record(4)
+        simulation.record = lambda steps, every=1: made.ExactSimulation(scene, dt).record(4, 1)
         return simulation
 
 

@@ -121,6 +121,6 @@ def test_states_of_another_library_are_read_in_the_way_that_it_offers(way, numbe
     found = Elsewhere([made.Exact().prepare(start, 1e-2) for start in starts], None)
     recorded = BatchSimulation.record(found, 4)
     again = made.Exact().prepare(scene, 1e-2)
-    expected = again.record(4).astype(number)
+    expected = again.record(4, 1).astype(number)
     np.testing.assert_array_equal(recorded, [expected, expected])
     np.testing.assert_array_equal(verified_batch(OfAnotherLibrary(recorded, way), 2, 5), recorded)

@@ -92,6 +92,12 @@ def test_engine_that_is_not_sound_at_the_nominal_values_has_the_smaller_steps_tr
     ]
 
 
+def test_message_of_a_crash_that_ends_a_sound_range_is_printed(study):
+    """It may be an exception of the adapter, which is no limit of the engine."""
+    crashing = replace(study, scans=(scan("a", ["sound", "crashed", "crashed"]), scan("a", ["sound", "inaccurate", "crashed"], "step")))
+    assert limits.sentences(crashing)[1:-1] == ["a crashed at 10 on the axis spin [rad/s]: it is off by 0.2."]
+
+
 def test_table_of_80_columns_keeps_words_and_numbers_whole(study, capsys, monkeypatch):
     for name, value in TERMINAL.items():
         monkeypatch.setenv(name, value)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dropspin.comparisons.faults.conventions import CONVENTIONS
 from dropspin.comparisons.faults.fault_model import unchanged
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth
-from dropspin.scenarios.rotations import angle_between_orientations
+from dropspin.scenarios.rotations import angle_between_orientations, length
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 from dropspin.scenarios.text import counted
 
@@ -27,16 +27,29 @@ EXPLAINED = 0.1
 """Largest share of a difference that is left where a fault explains it."""
 AT_START = 1e-3
 """Largest difference of the first state from the start; a velocity may also be a time step early or late."""
+PROPORTIONAL = 0.02
+"""Largest share of the movements, in the median, by which they differ from velocities that they are proportional to."""
 STAYS = 1e-6
 """A body that moves by at most this share of its size stays, up to rounding: its positions do not determine its velocities."""
 UNITS_OF_TIME = {1e3: "ms", 1e6: "µs", 1e9: "ns", 1.0 / 60.0: "minutes"}
 LONGEST = 2000  # rows that are compared
 
 
+@np.errstate(all="ignore")  # of an engine that blows up, squares are infinite
 def verify_motion(scene: Scenario, truth: Truth | None, motion: Trajectory) -> None:
     """Raise `DropspinError` if a motion is not one of a scene; the message says what was recognised, and what to do."""
-    for problem in chain(_of_times(motion), _of_rates(scene, motion), _of_states(scene, truth, motion)):
+    states = _of_states(scene, truth, motion)
+    for problem in chain(_of_shapes(motion), _of_times(motion), _of_numbers(motion), _of_rates(scene, motion), states, _of_ratios(motion)):
         raise DropspinError(f"motion: {problem}.")
+
+
+def _of_shapes(motion: Trajectory) -> Iterator[str]:
+    """Of fields that are no arrays of one row for each time."""
+    count = np.size(motion.t)
+    for name, row in {"t": (), "position": (3,), "orientation": (4,), "velocity": (3,), "angular_velocity": (3,)}.items():
+        found = getattr(motion, name)
+        if not isinstance(found, np.ndarray) or found.shape != (count, *row):
+            yield f"{name} is {type(found).__name__} of shape {np.shape(found)}; give an array of shape {(count, *row)}"
 
 
 def problems_of_order(t: Array) -> Iterator[str]:
@@ -77,21 +90,41 @@ def _of_times(motion: Trajectory) -> Iterator[str]:
         yield f"the times begin at {motion.t[0]:.4g} s; give the motion from the scene's start on, at time 0"
 
 
+def _of_numbers(motion: Trajectory) -> Iterator[str]:
+    """Of states that are no numbers, or whose quaternions are no rotations."""
+    lengths = length(motion.orientation)
+    if (bad := motion.first_bad_row) is not None:
+        yield f"the state at {motion.t[bad]:.4g} s is not finite; give the motion up to there, and a scene that is as long"
+    elif (off := np.abs(lengths - 1.0) > AT_START).any():
+        row = int(np.argmax(off))
+        yield f"the quaternion at {motion.t[row]:.4g} s has length {lengths[row]:.4g}; give unit quaternions"
+
+
 def _of_rates(scene: Scenario, motion: Trajectory) -> Iterator[str]:
-    """Of velocities that do not fit the change of the positions."""
-    moved, dt = np.diff(motion.position, axis=0), np.diff(motion.t)[:, None]
-    expected = 0.5 * dt * (motion.velocity[1:] + motion.velocity[:-1])
-    if not np.isfinite(moved).all() or not np.isfinite(expected).all():
-        return
+    """Of velocities that are 0, or whose times have another unit, by the change of the positions."""
     if np.ptp(motion.position, axis=0).max() <= STAYS * scene.body.size:
         return
+    _, expected, ratio = _movements(motion)
     if not expected.any():
         yield "velocities are 0 while the position changes; give the velocity of the centre of mass [m/s]"
-    else:
-        ratio = float(np.sum(moved * expected) / np.sum(expected**2))
-        for factor, unit in UNITS_OF_TIME.items():
-            if abs(ratio * factor - 1.0) < GROSS:
-                yield f"the times appear to be in {unit}, by the velocities and the change of the position; give them in s"
+    for factor, unit in UNITS_OF_TIME.items():
+        if abs(ratio * factor - 1.0) < GROSS:
+            yield f"the times appear to be in {unit}, by the velocities and the change of the position; give them in s"
+
+
+def _of_ratios(motion: Trajectory) -> Iterator[str]:
+    """Of velocities that are proportional to the change of the positions, but not equal to it."""
+    moved, expected, ratio = _movements(motion)
+    left = float(np.median(length(moved - ratio * expected)))  # impacts within a step apart
+    if ratio > 0.0 and abs(ratio - 1.0) > GROSS and left < PROPORTIONAL * float(np.median(length(moved))):
+        yield f"velocities are {1.0 / ratio:.3g} times the change of the position in a second; give both in metres and seconds"
+
+
+def _movements(motion: Trajectory) -> tuple[Array, Array, float]:
+    """The change of the position in each step, that by the velocities [m], shape (n - 1, 3), and the ratio of the two; NaN without any."""
+    moved, dt = np.diff(motion.position, axis=0), np.diff(motion.t)[:, None]
+    expected = 0.5 * dt * (motion.velocity[1:] + motion.velocity[:-1])
+    return moved, expected, float(np.sum(moved * expected) / np.sum(expected**2))
 
 
 def _of_states(scene: Scenario, truth: Truth | None, motion: Trajectory) -> Iterator[str]:
@@ -99,22 +132,21 @@ def _of_states(scene: Scenario, truth: Truth | None, motion: Trajectory) -> Iter
     first = truth.events[0].time if truth is not None and truth.events else np.inf
     known = np.array([0.0]) if truth is None else motion.t[(motion.t < first) & truth.covers(motion.t)][:LONGEST]
     exact = scene.initial_state[None] if truth is None or not len(known) else truth(known).states
-    found = motion.states[: len(exact)]
-    if not np.isfinite(found).all():
-        return
+    found, speed = motion.states[: len(exact)], _speed(scene, exact) or 1.0
     dt, lag = float(motion.t[1] - motion.t[0]), abs(motion.velocity_lag)
-    plain = _difference(scene, found, exact)
+    plain = _difference(scene, found, exact, speed)
     if plain > GROSS:
         read = [fault for fault in CONVENTIONS if fault.simulated is unchanged]
-        left = [_difference(scene, found, fault.reported(exact)) for fault in read]
+        left = [_difference(scene, found, fault.reported(exact), speed) for fault in read]
         if min(left) <= EXPLAINED * plain:
             yield f"{read[int(np.argmin(left))].message}; convert the states"
             return
     early = (dt + lag) * max(float(np.linalg.norm(scene.acceleration)), float(np.linalg.norm(scene.start.angular_velocity)) ** 2)
-    off = _difference(scene, found[:1], scene.initial_state[None])
-    if off > AT_START + early / (_speed(scene, exact) or 1.0):
+    off = _difference(scene, found[:1], scene.initial_state[None], speed)
+    if off > AT_START + early / speed:
         own, other = (
-            f"{_listed(state[POSITION])} m with velocity {_listed(state[VELOCITY])} m/s" for state in (found[0], scene.initial_state)
+            f"{_listed(state[POSITION])} m with velocity {_listed(state[VELOCITY])} m/s and angular velocity {_listed(state[SPIN])} rad/s"
+            for state in (found[0], scene.initial_state)
         )
         turned = (
             f", turned by {float(angle_between_orientations(found[:1, ORIENTATION], scene.initial_state[None, ORIENTATION])[0]):.3g} rad"
@@ -128,9 +160,8 @@ def _speed(scene: Scenario, exact: Array) -> float:
     return max(speed, size * spin, float(np.sqrt(g * size)))
 
 
-def _difference(scene: Scenario, found: Array, exact: Array) -> float:
-    """The largest difference of states, of angles [rad], and relative to the body's size and the largest speed."""
-    speed = _speed(scene, exact) or 1.0
+def _difference(scene: Scenario, found: Array, exact: Array, speed: float) -> float:
+    """The largest difference of states, of angles [rad], and relative to the body's size and a speed [m/s]."""
     scales = ((POSITION, scene.body.size), (VELOCITY, speed), (SPIN, speed / scene.body.size))
     lengths = [float(np.linalg.norm(found[:, part] - exact[:, part], axis=1).max()) / scale for part, scale in scales]
     return max(*lengths, float(angle_between_orientations(found[:, ORIENTATION], exact[:, ORIENTATION]).max()))

@@ -1,7 +1,11 @@
 """`measure` refuses a motion that is not the scene's and says why; motions with any error of an engine are measured."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from dropspin.comparisons.engines.registry import engine as engine_named
 from dropspin.comparisons.running.recording import record
@@ -47,7 +51,7 @@ MISMATCHES = {
     "higher": (
         BALL,
         with_part(1, lambda y: y + 0.01),
-        "it begins at (0, 1.11, 0) m with velocity (0, 0, 0) m/s, the scene at (0, 1.1, 0) m",
+        "it begins at (0, 1.11, 0) m with velocity (0, 0, 0) m/s and angular velocity (0, 0, 0) rad/s, the scene at (0, 1.1, 0) m",
     ),
     "late": (BALL, lambda t, rows: (t[:-100], rows[100:]), "it begins at (0, 1.051, 0) m with velocity (0, -0.98, 0) m/s"),
     "late times": (BALL, lambda t, rows: (t[100:], rows[100:]), "the times begin at 0.1 s; give the motion from the scene's start on"),
@@ -60,6 +64,10 @@ MISMATCHES = {
         "3 states are missing between equal steps, the first after 0.299 s",
     ),
     "backwards": (BALL, lambda t, rows: (t[::-1], rows), "the times do not increase"),
+    "revolutions per minute": (FLIGHT, with_part(slice(10, 13), lambda w: w * 30.0 / np.pi), "and angular velocity ("),
+    "long quaternions": (FLIGHT, with_part(slice(3, 7), lambda q: 1.01 * q), "the quaternion at 0 s has length 1.01"),
+    "no number": (BALL, lambda t, rows: (t, np.where(t[:, None] > 0.5, np.nan, rows)), "the state at 0.501 s is not finite"),
+    "kilometres per hour": (BALL, with_part(slice(7, 10), lambda v: 3.6 * v), "velocities are 3.6 times the change of the position"),
     "no velocities": (BALL, with_part(slice(7, 10), np.zeros_like), "velocities are 0 while the position changes"),
 }
 
@@ -92,6 +100,24 @@ def test_motion_with_errors_of_an_engine_is_measured(engine, scene):
     brief = load(scene).model_copy(update={"duration": 1.0})
     for dt in (1e-3, 2e-2):
         assert "position_error" in measure(brief, record(engine_named(engine), brief, dt).motion)
+
+
+def test_fields_of_other_shapes_are_named():
+    t, rows = times_and_states(BALL)
+    whole = Trajectory.from_states(t, rows)
+    for position, given in ((whole.position.tolist(), "list of shape (1001, 3)"), (whole.position[:7], "ndarray of shape (7, 3)")):
+        with pytest.raises(DropspinError, match=re.escape(f"position is {given}; give an array of shape (1001, 3)")):
+            measure(BALL, replace(whole, position=position))
+
+
+def test_motion_of_a_spin_that_grows_is_measured_and_not_taken_for_degrees():
+    scene = load("spin-principal")
+    t = DT * np.arange(scene.steps(DT) + 1)
+    rows = np.tile(scene.initial_state, (len(t), 1))
+    spin = rows[0, 10:] / 3.0
+    turned = Rotation.from_rotvec(np.outer(np.expm1(3.0 * t), spin)) * Rotation.from_quat(rows[0, 3:7])
+    rows[:, 3:7], rows[:, 10:] = turned.as_quat(), np.exp(3.0 * t)[:, None] * rows[0, 10:]
+    assert measure(scene, Trajectory.from_states(t, rows))["energy_error"] > 100.0
 
 
 def test_frozen_motion_is_measured():

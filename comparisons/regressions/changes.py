@@ -93,12 +93,13 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
 
     Returns:
         The columns of `KEY`, then `unit`, `value`, `before` (the earlier value), `tolerance`, the bounds `lower` and `upper` within which
-        the value is not worse, `change` (same, better, worse, moved, new, gone) and `in_tolerances`, the size of the change in
-        tolerances.
+        the value is not worse, `change` (same, better, worse, moved, new, gone, or undefined of an order or asymptotic error) and
+        `in_tolerances`, the size of the change in tolerances.
     """
     held = [*KEY, "value", "tolerance", "unit"]
     both = before[held].merge(after[held], how="outer", on=KEY, suffixes=("_before", "_after"), sort=False)
     old, new = both["value_before"].to_numpy(), both["value_after"].to_numpy()
+    lost = np.isnan(new)
     # The earlier tolerance alone: a result that has gone wrong must not widen its own bounds.
     tolerance = both["tolerance_before"].fillna(both["tolerance_after"]).to_numpy()
     way = both["kind"].map(BETTER).to_numpy()
@@ -110,8 +111,8 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
     within = (lower <= new) & (new <= upper)
     other_side = errors & (np.abs(new) <= np.abs(old) + tolerance)
     change = np.select(
-        [np.isnan(old), np.isnan(new), within & better, within, (way == "neither") | other_side],
-        ["new", "gone", "better", "same", "moved"],
+        [np.isnan(old), lost & both["kind"].isin(STUDIES), lost, within & better, within, (way == "neither") | other_side],
+        ["new", "undefined", "gone", "better", "same", "moved"],
         "worse",
     )
     unit = both["unit_after"].where(both["unit_after"].notna(), both["unit_before"])
@@ -124,8 +125,7 @@ def regressed(found: pd.DataFrame) -> pd.DataFrame:
 
     An order or an asymptotic error that is now undefined is not among them, because the errors from which it is computed are compared too.
     """
-    lost = (found["change"] == "gone") & ~found["kind"].isin(STUDIES)
-    return found[found["change"].isin(["worse", "moved"]) | lost]
+    return found[found["change"].isin(["worse", "moved", "gone"])]
 
 
 def most_changed_first(found: pd.DataFrame) -> pd.DataFrame:

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dropspin.comparisons.judging.convergence import STUDIES
 from dropspin.comparisons.judging.verdicts import FAILURES, Verdict
 from dropspin.comparisons.regressions.attribution import CORRECTION, Attribution, attribute, common_settings
 from dropspin.comparisons.regressions.baseline import COLUMNS, Acceptance, Baseline, load_baseline
@@ -38,7 +37,8 @@ from dropspin.comparisons.results.table import Measurement, as_table
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.validation import validated
 
-VERDICTS: dict[str, Verdict] = {"same": "passed", "better": "passed", "worse": "failed", "moved": "failed", "gone": "failed"}
+VERDICTS: dict[str, Verdict] = {"same": "passed", "better": "passed", "worse": "failed", "moved": "failed"}
+LOST = ("gone", "undefined")
 ACCEPTED = {"order": "accepted order", "asymptotic_error": "accepted asymptotic error", "ensemble": "accepted mean"}
 """The column `truth` of a row of kind `baseline`; `accepted` for all others."""
 
@@ -84,7 +84,7 @@ def accept(
 
     Returns:
         The new baseline, and a table of the differences from the earlier one. The table has a row for each result, with `value` and
-        `before` in `unit`, and the `change`: new, worse, moved, better, same or gone.
+        `before` in `unit`, and the `change`: new, worse, moved, better, same, gone or undefined.
 
     Raises:
         DropspinError: The run was made with `quick`, or the reason is empty or has several lines.
@@ -94,7 +94,7 @@ def accept(
     measured["known_failure"] = (measured["verdict"] == "failed") & known_failures
     comparable = covered[~_has_other_scene(covered, earlier, results)]
     found = changes(comparable, measured)
-    lost = (found["change"] == "gone") & broke_down(found, results)
+    lost = found["change"].isin(LOST) & broke_down(found, results)
     kept = comparable.merge(found.loc[(found["change"] == "same") | lost, KEY], on=KEY)
     if known_failures:
         flags = kept[KEY].merge(measured[[*KEY, "known_failure"]], on=KEY, how="left")["known_failure"]
@@ -161,8 +161,8 @@ def check(results: Results, baseline: Baseline | str | Path | None = None) -> Ch
         Measurement(scene=scene, engine=engine, kind="baseline", truth="accepted", verdict="failed", reason=STALE, basis="scene_changed")
         for scene, engine in stale
     ]
-    rows += _lost_rows(results, noted[noted["change"] == "gone"])
-    for row in noted[~noted["change"].isin(["new", "gone"])].to_dict("records"):
+    rows += _lost_rows(results, noted[noted["change"].isin(LOST)])
+    for row in noted[~noted["change"].isin(["new", *LOST])].to_dict("records"):
         by = baseline.acceptances[row["by"]]
         away = "" if row["change"] == "same" else f"; {row['change']} by {row['in_tolerances']:,.3g} times its tolerance"
         reason = f"accepted {row['before']:.6g} ± {row['tolerance']:.2g} on {by.date}, {by.reason}{away}{row['note']}"
@@ -231,8 +231,8 @@ def _lost_rows(results: Results, gone: pd.DataFrame) -> list[Measurement]:
             rows.append(_row(records[0], "failed", f"{len(lost)} accepted results are gone, {reasons[where]}", metric="", unit=""))
             continue
         for row in records:
-            verdict: Verdict = "measured" if row["kind"] in STUDIES else "failed"
-            now = "undefined now" if row["kind"] in STUDIES else f"not measured now{row['note']}"
+            verdict: Verdict = "failed" if row["change"] == "gone" else "measured"
+            now = f"not measured now{row['note']}" if row["change"] == "gone" else "undefined now"
             rows.append(_row(row, verdict, f"accepted {row['before']:.6g}, {now}"))
     return rows
 

@@ -69,9 +69,9 @@ def compare(old: Results, new: Results) -> Changes:
         new: The later run.
 
     Returns:
-        The changes: `results`, a table with `value` and `before` in `unit`, and the `change` (same, better, worse, moved, new or gone);
-        `attributions`, the cause to which the changes of each engine are attributed; `speed`, the change of
-        the ratio of the times per step of two engines; and `motions`, how many motions are equal bit for bit in both runs.
+        The changes: `results`, a table with `value` and `before` in `unit`, and the `change` (same, better, worse, moved, new, gone or
+        undefined); `attributions`, the cause to which the changes of each engine are attributed; `speed`, the change of the ratio of the
+        times per step of two engines; and `motions`, how many motions are equal bit for bit in both runs.
 
     Raises:
         DropspinError: The runs have no scene, engine and time step in common, or one of them was made with `quick`.
@@ -190,7 +190,7 @@ def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> li
             before = held.get(engine, now.iloc[:0])
             change = changes(before, now)
             moved[engine] = most_changed_first(change[change["change"].isin(["worse", "moved", "better"])])
-            stays = change["change"].isin(["same", "gone"])
+            stays = change["change"].isin(["same", "gone", "undefined"])
             kept, fresh = before.merge(change.loc[stays, KEY], on=KEY), now.merge(change.loc[~stays, KEY], on=KEY)
             held[engine] = pd.concat([kept, fresh], ignore_index=True)
         unmoved = [engine for engine, differing in moved.items() if differing.empty and engine in last]

@@ -63,7 +63,7 @@ def sentences(checked: Checked, run: str, baseline: str | None) -> list[str]:
     notes = []
     for (engine, cause), count in checked.attributions.items():
         notes.append(f"{engine}: {counted(count, 'result is', 'results are')} worse, moved or gone. {capitalized(cause.message)}.")
-    for change, words in (("better", "better than accepted"), ("new", "new and not yet accepted")):
+    for change, words in (("better", "better than accepted"), ("new", "new and not yet accepted"), ("undefined", "undefined now")):
         if count := int(changes.get(change, 0)):
             notes.append(f"{counted(count, 'result is', 'results are')} {words}.")
     if len(checked.not_run):
@@ -104,7 +104,7 @@ def _verdict(checked: Checked, failed_rows: pd.DataFrame, verdict: str) -> str:
 def accepted_sentences(results: Results, accepted: pd.DataFrame, known_failures: bool) -> list[str]:
     """Sentences on how many results of a run were accepted, and which cannot be accepted."""
     changed = accepted["change"].value_counts()
-    kinds = [f"{changed[kind]:,} {kind}" for kind in ("new", "worse", "moved", "better", "gone", "same") if kind in changed]
+    kinds = [f"{changed[kind]:,} {kind}" for kind in ("new", "worse", "moved", "better", "gone", "undefined", "same") if kind in changed]
     measured = ", ".join(engine for engine in results.engines if (accepted["engine"] == engine).any())
     notes = [f"Accepted for {counted(len(results.scenes), 'scene')} with {measured}: {', '.join(kinds) or 'no results'}."]
     tally = counts(results)

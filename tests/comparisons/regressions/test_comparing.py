@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.releases import DTS, SCENES, TURNING, Candidate, WithoutGyroscopicTerm, part, released
+from support.releases import DTS, SCENES, TURNING, Broken, Candidate, WithoutGyroscopicTerm, part, released
 
 from dropspin.comparisons.regressions.changes import speed_changes
 from dropspin.comparisons.regressions.comparing import compare
@@ -29,6 +29,13 @@ def test_changes_of_a_faulty_release_are_attributed_to_it(before, release):
     assert set(found.regressions["scene"]) == TURNING
     back = compare(faulty, before)
     assert set(back.of("better")["engine"]) == {"candidate"}
+
+
+def test_results_of_a_breakdown_are_gone_and_their_orders_undefined(before, release):
+    """So that those that are gone are those that fail."""
+    found = compare(before, release(Broken, "mujoco"))
+    assert found.of("gone").equals(found.regressions)
+    assert set(found.of("undefined")["kind"]) == {"order", "asymptotic_error"}
 
 
 def test_what_one_run_was_not_asked_for_is_neither_new_nor_gone(before):

@@ -17,7 +17,7 @@ def test_compare_says_what_got_worse_and_why(repository, tmp_path):
     output = " ".join(done.stdout.split())
     assert "Attributed to the engine: my-engine good → failing, its settings (restitution)." in output
     assert re.search(r"Worse: \d+ results scene engine .* drop-ball my-engine restitution error \d ms \S+ 5\.00e-03 ", output)
-    headings = re.findall(r"^(?:Worse|Gone|Moved|Better|New): ", done.stdout, re.MULTILINE)
+    headings = re.findall(r"^(?:Worse|Gone|Moved|Better|Undefined|New): ", done.stdout, re.MULTILINE)
     assert len(re.findall(r"(?m)^drop-ball +my-engine ", done.stdout)) == len(headings) > 0  # one row for each kind of change
     assert output.count("Reproduce: dropspin run drop-ball -e my_engine:MyEngine --dt 0.008 --dt 0.004 --dt 0.002 -o out/again") == 1
     assert "| drop-ball | my-engine | restitution error |" in (tmp_path / "summary.md").read_text()

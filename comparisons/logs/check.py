@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.logs.falling import ALARM, flights_in_any_units
+from dropspin.comparisons.logs.falling import flights_in_any_units
 from dropspin.comparisons.logs.flight import (
     ACCELERATION,
     OFFSET,
@@ -31,6 +31,8 @@ from dropspin.scenarios.rotations import unrotate
 from dropspin.scenarios.state import UP, Array
 from dropspin.scenarios.validation import validated
 
+ALARM = 1e-4
+"""Probability of a finding where there is nothing, of each value."""
 UNIT = 0.05
 """Largest relative difference from the ratio of two units."""
 LEAST_SCALE, ON_EARTH = 5e-4, 4e-3
@@ -114,7 +116,7 @@ def log_check(recording: Flights | Log | str | Path) -> Check:
         DropspinError: The recording cannot be loaded, or no toss has a free flight.
     """
     log = load_log(recording) if isinstance(recording, str | Path) else recording
-    flights = flights_in_any_units(log) if isinstance(log, Log) else log
+    flights = flights_in_any_units(log, ALARM) if isinstance(log, Log) else log
     drag = regression([positions(flight, with_drag=True) for flight in flights.found])
     found = [*_of_units(flights), *of_quaternions(flights.log, flights), *of_rates(flights), *of_frames(flights)]
     values = tuple(_values(flights, drag))

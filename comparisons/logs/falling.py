@@ -13,8 +13,6 @@ from dropspin.comparisons.logs.log import Log
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.state import Array
 
-ALARM = 1e-4
-"""Probability of a finding where there is nothing, of each value."""
 ABOUT = 0.75
 """Share of the frames of the longest falls from which on the header's acceleration is that of the tosses."""
 MOST_TOSSES, MOST_PIECES = 20, 200
@@ -23,8 +21,8 @@ RATES = (0.5, 2.0)
 """Rates over the true one that are tried."""
 
 
-def flights_in_any_units(log: Log) -> Flights:
-    """The flights of a recording, of whatever acceleration.
+def flights_in_any_units(log: Log, alarm: float) -> Flights:
+    """The flights of a recording, of whatever acceleration; `alarm` is the probability with which errors may look like one.
 
     Raises:
         DropspinError: There is none.
@@ -32,7 +30,7 @@ def flights_in_any_units(log: Log) -> Flights:
     down = np.array([0.0, -log.header.gravity, 0.0])
     acceleration = _acceleration(log, down)
     flights = flights_of(log, acceleration)
-    if flights is None or (acceleration is not down and not _flies(flights)):
+    if flights is None or (acceleration is not down and not _flies(flights, alarm)):
         needed = max(window_size(toss, noise_of(log), down) for toss in log.tosses)
         raise DropspinError(
             f"{log.origin}: no toss has {needed} frames of free flight with one acceleration; film from the release on, and give "
@@ -41,10 +39,10 @@ def flights_in_any_units(log: Log) -> Flights:
     return flights
 
 
-def _flies(flights: Flights) -> bool:
+def _flies(flights: Flights, alarm: float) -> bool:
     """Whether an acceleration that is not the header's is one, and the body does not stay on the floor all the while."""
     moving, header = flights.moving, flights.log.header
-    if np.linalg.norm(moving.values[ACCELERATION]) <= np.linalg.norm(moving.half_widths(ALARM)[ACCELERATION]):
+    if np.linalg.norm(moving.values[ACCELERATION]) <= np.linalg.norm(moving.half_widths(alarm)[ACCELERATION]):
         return False
     each = [heights(header, flight.toss.position[flight.rows], flight.toss.orientation[flight.rows]) for flight in flights.found]
     return bool(np.abs(np.concatenate(each)).max() > NEAR_FLOOR * header.body.size)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.logs.columns import ORIENTATION, POSITION, SPIN, VELOCITY, read_columns
+from dropspin.comparisons.logs.formats import FORMATS, ORIENTATION, POSITION, SPIN, VELOCITY, read_columns
 from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
 from dropspin.comparisons.running.belonging import is_uneven, missing_frames, problems_of_order
 from dropspin.scenarios.errors import DropspinError, UnknownName
@@ -136,7 +136,7 @@ def load_log(recording: str | Path) -> Log:
     path = SHIPPED / f"{given}.toml" if given in log_names() else Path(recording)
     if not path.suffix and not path.exists():
         raise UnknownName("recording", given, log_names())
-    if path.suffix.lower() in (".csv", ".parquet", ".npz", ".mcap"):
+    if path.suffix.lower() in FORMATS:
         raise DropspinError(f"{given}: is the data of a recording; give its header, a TOML file with the keys data and [body].")
     header = validated(Header, given, with_mesh(read_toml(path, given, "recording"), path.parent))
     columns, names = read_columns(path.parent / header.data, str(Path(given).parent / header.data), header.topic)

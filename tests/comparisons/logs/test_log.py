@@ -11,7 +11,7 @@ import pytest
 import tomlkit
 from scipy.spatial.transform import Rotation
 
-from dropspin.comparisons.logs import columns as columns_module
+from dropspin.comparisons.logs import formats
 from dropspin.comparisons.logs.header import LENGTHS, TIMES
 from dropspin.comparisons.logs.log import load_log
 from dropspin.scenarios import DropspinError
@@ -317,7 +317,7 @@ def test_too_many_rows_are_refused_before_they_are_read(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("ending", ["csv", "parquet", "mcap"])
 def test_rows_are_limited_in_every_format(tmp_path, monkeypatch, ending):
-    monkeypatch.setattr(columns_module, "MOST_ROWS", FRAMES - 1)
+    monkeypatch.setattr(formats, "MOST_ROWS", FRAMES - 1)
     with pytest.raises(DropspinError, match="has more than 39 rows"):
         load_log(written(tmp_path, POSE, name=f"toss.{ending}"))
 

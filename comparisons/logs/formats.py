@@ -5,7 +5,6 @@ import json
 import warnings
 import zipfile
 from collections.abc import Callable, Collection, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -52,14 +51,12 @@ def read_columns(path: Path, given: str, topic: str | None) -> tuple[dict[str, A
     Raises:
         DropspinError: The file is absent, damaged, too large or of another format, or has other columns, or values that are no numbers.
     """
-    readers: dict[str, Callable[[bytes, str], Columns]]
-    readers = {".csv": _csv, ".parquet": _parquet, ".npz": _npz, ".mcap": partial(_mcap, topic=topic)}
     ending = path.suffix.lower()
-    if ending not in readers:
-        raise DropspinError(f"{given}: is not the data of a recording; give a file that ends in {', '.join(readers)}.")
+    if ending not in FORMATS:
+        raise DropspinError(f"{given}: is not the data of a recording; give a file that ends in {', '.join(FORMATS)}.")
     raw = read_file(path, given, "recording", LARGEST_FILE)
     try:
-        columns = readers[ending](raw, given)
+        columns = FORMATS[ending](raw, given, topic)
     except DropspinError:
         raise
     except Exception as error:  # whatever the libraries raise for a damaged file
@@ -102,7 +99,7 @@ def _verify_first_line(given: str, names: Sequence[str]) -> None:
             raise DropspinError(f"{given}: column {shown(name)} is there twice; give each column once.")
 
 
-def _csv(raw: bytes, given: str) -> Columns:
+def _csv(raw: bytes, given: str, _topic: str | None) -> Columns:
     first = pd.read_csv(io.BytesIO(raw), nrows=1, header=None, skipinitialspace=True, dtype=str, keep_default_na=False)
     names = list(map(str, first.iloc[0]))
     _verify_first_line(given, names)
@@ -118,7 +115,7 @@ def _csv(raw: bytes, given: str) -> Columns:
     return {name: table[name] for name in names}
 
 
-def _parquet(raw: bytes, given: str) -> Columns:
+def _parquet(raw: bytes, given: str, _topic: str | None) -> Columns:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -131,7 +128,7 @@ def _parquet(raw: bytes, given: str) -> Columns:
     return {name: (table[name].cast(pa.float64()) if name in decimals else table[name]).to_pandas() for name in table.column_names}
 
 
-def _npz(raw: bytes, given: str) -> Columns:
+def _npz(raw: bytes, given: str, _topic: str | None) -> Columns:
     with zipfile.ZipFile(io.BytesIO(raw)) as archive:
         _verify(given, [name.removesuffix(".npy") for name in archive.namelist()])
         for name in archive.namelist():
@@ -163,6 +160,10 @@ def _mcap(raw: bytes, given: str, topic: str | None) -> Columns:
     if not rows:
         raise DropspinError(f"{given}: has no message{'' if topic is None else f' of topic {topic}'}.")
     return dict(pd.DataFrame.from_records(rows, columns=list(rows[0])))
+
+
+FORMATS: dict[str, Callable[[bytes, str, str | None], Columns]] = {".csv": _csv, ".parquet": _parquet, ".npz": _npz, ".mcap": _mcap}
+"""By the ending of the file: the columns in its content; the path for messages, and the topic."""
 
 
 def _numbers(given: str, name: str, values: Any) -> Array:

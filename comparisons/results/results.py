@@ -182,8 +182,14 @@ class Results:
         return shown[shown["dt"] == shown["dt"].min()].set_index("engine")
 
     def _metric_of_findings(self, rows: pd.DataFrame) -> str:
-        """The metric of the largest error, relative to its scale, among those that set a status; empty if there is none."""
-        findings = rows[rows["verdict"].isin(["known", "limited", *FAILURES]) & (rows["value"].abs() > SMALLEST_STATED)]
+        """The metric of the largest error, relative to its scale, among those that set a status; empty if there is none.
+
+        An error that fails at another time step, or as dt → 0 alone, is one of them.
+        """
+        of = ["scene", "engine", "metric"]
+        failed = pd.MultiIndex.from_frame(self.table.loc[self.table["verdict"].isin(FAILURES), of])
+        is_finding = rows["verdict"].isin(["known", "limited"]) | pd.MultiIndex.from_frame(rows[of]).isin(failed)
+        findings = rows[is_finding & (rows["value"].abs() > SMALLEST_STATED)]
         findings = findings[~findings["metric"].isin([*JUMPING, *ARTEFACTS, *PARTS])]
         if findings.empty:
             return ""

@@ -22,7 +22,7 @@ WITHOUT_FINDING = frozenset({"passed", "measured", "declined", "no_truth"})
 
 MEANINGS = {
     "passed": "within every bound; an error without a bound falls to 0 with dt",
-    f"passed ({UNDECIDED})": "as passed, but an error may remain as dt → 0",
+    f"passed ({UNDECIDED})": "within every bound; an error without a bound may remain as dt → 0",
     "failed": "a check is outside its bound",
     "failed (diverged)": "a state was not finite, or the engine reported a breakdown",
     "failed (crashed)": "the engine raised an exception, or its process ended",
@@ -160,7 +160,9 @@ def shown_scenes(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str
     ]
     worst = sorted(found, key=lambda scene: min(VERDICTS.index(status.verdict) for status in statuses[scene].values()))[:MOST_SCENES]
     fine, more = len(statuses) - len(found), len(found) - len(worst)
-    left_out = [f"{fine} in which no engine has a finding"] * bool(fine) + [f"{more} with less severe findings"] * bool(more)
+    declined = sum(all(status.verdict == "declined" for status in by_engine.values()) for by_engine in statuses.values())
+    of_them = f", {declined} of them declined" if declined else ""
+    left_out = [f"{fine} in which no engine has a finding{of_them}"] * bool(fine) + [f"{more} with less severe findings"] * bool(more)
     return [scene for scene in statuses if scene in worst], f"Scenes not shown: {', '.join(left_out)}."
 
 

@@ -12,7 +12,7 @@ from dropspin.comparisons.judging.verdicts import OUTCOMES, VERDICTS
 from dropspin.comparisons.results.results import MODEL_ERROR, UNDECIDED, Status
 from dropspin.reports.junit import junit_xml
 from dropspin.reports.plots.colours import human_label
-from dropspin.reports.stories.matrix import MEANINGS, explanations, leading_errors
+from dropspin.reports.stories.matrix import MEANINGS, explanations, leading_errors, shown_scenes
 from dropspin.reports.stories.run import overview
 
 
@@ -63,6 +63,20 @@ def test_small_error_is_not_shown_of_an_engine_that_fails_in_another_metric(core
     assert (before.metric, after.metric, before.sizes["pybullet"]) == ("orientation_error", "orientation_error", after.sizes["pybullet"])
     assert ("mujoco" in before.sizes, "mujoco" in after.sizes, after.levels["mujoco"]) == (True, False, None)
     assert after.sizes["wang"] == before.sizes["wang"]
+
+
+def test_error_that_fails_as_dt_vanishes_alone_is_the_one_that_is_shown(core):
+    table, scene = core.table.copy(), "drop-ball-backspin"
+    mine = (table["scene"] == scene) & (table["engine"] == "mujoco") & (table["metric"] == "energy_error")
+    table.loc[mine & (table["kind"] == "asymptotic_error"), "verdict"] = "failed"
+    table.loc[mine & (table["dt"] == 1e-3), "value"] = 0.05
+    shown = leading_errors(replace(core, table=table))[scene]
+    assert (shown.metric, shown.sizes["mujoco"]) == ("energy_error", "5.0")
+
+
+def test_scenes_that_every_engine_declines_are_counted():
+    statuses = {f"s{number}": {"a": Status(*(("declined", "") if number < 3 else ("passed", "")))} for number in range(20)}
+    assert shown_scenes(statuses)[1] == "Scenes not shown: 20 in which no engine has a finding, 3 of them declined."
 
 
 @pytest.mark.extended

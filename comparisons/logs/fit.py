@@ -1,5 +1,6 @@
 """The friction and restitution with which engines best match a recording, from the frames after the first contact of each toss."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -68,8 +69,8 @@ class Transfer:
         first: Label of the first engine.
         second: Label of the second engine.
         difference: The estimate of the first engine minus that of the second.
-        lower: Lower end of the interval of the difference.
-        upper: Upper end of the interval of the difference.
+        lower: Lower end of the interval of the difference; infinite if the tosses show no difference, and one bound of an estimate alone.
+        upper: Upper end of the interval of the difference, likewise.
         verdict: `equal` if the interval is within `EQUAL` of 0, `different` if it is on one side of 0, else `undecided`.
     """
 
@@ -194,8 +195,10 @@ def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Step
     lower, upper = expanded(ends.min(axis=0), ends.max(axis=0), size)
     by_step = abs(float((one.value - coarse.value - other.value + other_coarse.value)[column]))
     lower, upper = lower - by_step, upper + by_step
-    differs, is_equal = lower > 0.0 or upper < 0.0, are_bounded and max(-lower, upper) <= EQUAL
-    verdict = "equal" if is_equal else "different" if differs else "undecided"
+    differs = lower > 0.0 or upper < 0.0
+    if not are_bounded and not differs:  # the ends may be those of the values that were tried
+        lower, upper = -math.inf, math.inf
+    verdict = "equal" if max(-lower, upper) <= EQUAL and are_bounded else "different" if differs else "undecided"
     return Transfer(parameter, first, second, float(one.value[column] - other.value[column]), lower, upper, verdict)
 
 

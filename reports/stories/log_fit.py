@@ -1,5 +1,6 @@
 """The output of `dropspin log fit`: friction and restitution by engine, and which of them transfer from one engine to another."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Literal
@@ -95,6 +96,8 @@ def interval(estimate: Estimate) -> str:
 def transfer(pair: Transfer) -> str:
     """A sentence on whether the fitted value of a parameter is the same for two engines."""
     statement = TRANSFERS[pair.parameter][pair.verdict].format(first=pair.first, second=pair.second)
+    if math.isinf(pair.upper):
+        return f"{statement}: for at least one of them they show a bound on one side alone."
     return (
         f"{statement}. {pair.first} needs {abs(pair.difference):.3f} {'more' if pair.difference > 0.0 else 'less'} (95 % interval of "
         f"the difference: {pair.lower:.3f} to {pair.upper:.3f}; differences of up to {EQUAL} count as equal)."

@@ -11,6 +11,7 @@ from dropspin.comparisons.logs.grids import Profile, problem_of
 from dropspin.comparisons.logs.grids import _refined as refined_grid
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.log import Log, Toss
+from dropspin.reports.stories.log_fit import transfer
 from dropspin.scenarios.variations import with_values
 
 
@@ -82,6 +83,10 @@ def test_verdict_on_a_parameter_of_two_engines(spread, verdict):
     profiles = {"first": profile(of_first, 0.5 + spread[0]), "second": profile(np.full((1999, 2), 0.5), 0.5)}
     found = log_fits._transfer("restitution", "first", "second", profiles, 50, are_bounded=True)
     assert (found.verdict, found.difference) == (verdict, pytest.approx(spread[0]))
+    of_bounds = log_fits._transfer("restitution", "first", "second", profiles, 50, are_bounded=False)
+    unknown = verdict in ("equal", "undecided")
+    assert (of_bounds.verdict, np.isinf(of_bounds.upper)) == ("undecided" if unknown else verdict, unknown)
+    assert ("a bound on one side alone" in transfer(of_bounds)) == unknown
 
 
 def test_friction_of_any_engine_has_the_interval_of_a_mean_over_engines():

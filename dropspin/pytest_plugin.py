@@ -82,14 +82,17 @@ class Result:
         of_engine = [row for row in self.rows if engine is None or row["engine"] in labels]
         measured = [row for row in of_engine if row["kind"] in ("truth", "invariant", "ensemble")]
         rows = [row for row in measured if row["metric"] == metric and (dt is None or math.isclose(row["dt"], dt, rel_tol=1e-9))]
-        if not rows:
-            wanted = f"{metric} of {engine or self.scene} at {'any time step' if dt is None else f'{dt:g} s'}"
-            available = ", ".join(dict.fromkeys(row["metric"] for row in measured)) or "no metric"
-            stopped = "".join(f"; {row['engine']} {row['verdict']}: {row['reason']}" for row in self.rows if row["verdict"] in STOPPED)
-            raise LookupError(f"{wanted} was not measured; available: {available}{stopped}")
         engines = list(dict.fromkeys(row["engine"] for row in rows))
         if len(engines) > 1:
             raise LookupError(f"{metric} was measured for several engines, {', '.join(engines)}; choose one with engine=")
+        stops = [row["dt"] for row in of_engine if row["engine"] in engines and row["verdict"] in STOPPED and row["dt"] is not None]
+        if dt is None and min(stops, default=math.inf) < min((row["dt"] for row in rows), default=0.0):
+            rows, dt = [], min(stops)
+        if not rows:
+            wanted = f"{metric} of {engine or self.scene} at {'any time step' if dt is None else f'{dt:g} s'}"
+            available = ", ".join(dict.fromkeys(row["metric"] for row in measured)) or "no metric"
+            stopped = "".join(f"; {row['engine']} {row['verdict']}: {row['reason']}" for row in of_engine if row["verdict"] in STOPPED)
+            raise LookupError(f"{wanted} was not measured; available: {available}{stopped}")
         value = min(rows, key=lambda row: row["dt"])["value"]
         return math.nan if value is None else float(value)
 
@@ -134,7 +137,9 @@ class Runs:
 
         engines, dts = self.engines if engines is None else engines, self.dts if dts is None else dts
         options = _options(engines, dts, self.baseline)
-        asked = [scene if isinstance(scene, Mapping) else os.fspath(scene), options]
+        file = None if isinstance(scene, Mapping) else self.root / scene
+        content = hashlib.sha256(file.read_bytes()).hexdigest() if file and file.is_file() else ""  # a test may write a file again
+        asked = [scene if isinstance(scene, Mapping) else os.fspath(scene), options, content]
         name = f"{_title(scene)}-{hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]}"
         if name in self._results:
             return self._results[name]

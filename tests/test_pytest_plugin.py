@@ -160,19 +160,39 @@ def test_value_of_a_metric():
     """The finest time step by default; NaN if undefined; ambiguous and absent metrics are errors that say what there is."""
     row = {"kind": "truth", "metric": "energy_error", "verdict": "measured", "reason": ""}
     rows = [row | {"engine": "mine", "dt": 0.002, "value": None}, row | {"engine": "mine", "dt": 0.004, "value": 0.5}]
-    rows += [row | {"engine": "other", "dt": 0.004, "value": 0.25}, {"engine": "shy", "kind": "", "metric": ""}]
+    rows += [row | {"engine": "other", "dt": 0.004, "value": 0.25}, {"engine": "shy", "kind": "", "metric": "", "dt": 0.004}]
     rows[-1] |= {"verdict": "declined", "reason": "I do not spin"}
+    rows += [row | {"engine": "weak", "dt": 0.002, "value": 0.0}]
+    rows += [{"engine": "weak", "kind": "", "metric": "", "dt": 0.001, "verdict": "crashed", "reason": "too fine"}]
     result = pytest_plugin.Result("spin", rows, Path("out"), "spin", {"mine": "my_module:Mine"}, ())
     assert result.value("energy_error", engine="mine", dt=0.004) == 0.5
     assert result.value("energy_error", engine="my_module:Mine", dt=0.004) == 0.5
     assert result.value("energy_error", engine="other") == 0.25
     assert str(result.value("energy_error", engine="mine")) == "nan"
-    with pytest.raises(LookupError, match=r"^energy_error was measured for several engines, mine, other; choose one with engine=$"):
+    with pytest.raises(LookupError, match=r"^energy_error was measured for several engines, mine, other, weak; choose one with engine=$"):
         result.value("energy_error")
     with pytest.raises(
         LookupError, match=r"^energy_error of shy at 0\.004 s was not measured; available: no metric; shy declined: I do not spin$"
     ):
         result.value("energy_error", engine="shy", dt=0.004)
+    with pytest.raises(LookupError, match=r"^energy_error of weak at 0\.001 s was not measured; available: energy_error; weak crashed: too fine$"):
+        result.value("energy_error", engine="weak")
+
+
+def test_scene_file_that_is_written_again_is_run_again(repository):
+    repository.makepyfile(
+        """
+        SCENE = 'duration = {}\\nbody = {{shape = "sphere", radius = 0.1, mass = 1.0}}'
+
+        def test_both(dropspin_run, pytestconfig):
+            folders = []
+            for duration in (0.1, 0.2):
+                (pytestconfig.rootpath / "again.toml").write_text(SCENE.format(duration))
+                folders.append(dropspin_run("again.toml", engine="engines:Mine", dt=[0.004]).folder)
+            assert len(set(folders)) == 2
+        """
+    )
+    repository.runpytest_inprocess("-k", "test_both").assert_outcomes(passed=1)
 
 
 BASELINE = """

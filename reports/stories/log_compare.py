@@ -26,7 +26,7 @@ LEGEND = (
 IMPROVED = (
     "The first parts are decreases of the error by improvements that are made one after another: the centre of mass that the flights show, "
     "friction and restitution that were fitted (with --fit), half the time step. Start: the noise floor. Remaining: the rest of the "
-    "error, which is due to the model of contact. A negative part is an increase."
+    "error, due to the model of contact, the uncertainty of fitted values and the time step. A negative part is an increase."
 )
 AT = {"impact": "at impact", "+0.1 s": "0.1 s later", "mean": "mean over the motion", "end": "at the end"}
 

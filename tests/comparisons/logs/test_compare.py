@@ -31,7 +31,7 @@ class Diverging(Wang):
     def prepare_batch(self, members, dt):
         batch = super().prepare_batch(members, dt)
         record = batch.record
-        batch.record = lambda steps: np.where(np.arange(steps + 1)[:, np.newaxis] > 10, np.nan, record(steps))
+        batch.record = lambda steps, every: np.where(np.arange(steps + 1)[:, np.newaxis] > 10, np.nan, record(steps, every))
         return batch
 
 

@@ -22,7 +22,7 @@ WITHOUT_FINDING = frozenset({"passed", "measured", "declined", "no_truth"})
 
 MEANINGS = {
     "passed": "within every bound; an error without a bound falls to 0 with dt",
-    f"passed ({UNDECIDED})": "within every bound; an error without a bound may remain as dt → 0",
+    f"passed ({UNDECIDED})": "within every bound; an error may remain as dt → 0",
     "failed": "a check is outside its bound",
     "failed (diverged)": "a state was not finite, or the engine reported a breakdown",
     "failed (crashed)": "the engine raised an exception, or its process ended",

@@ -117,7 +117,7 @@ class Move(NamedTuple):
         engine: Label of the engine.
         before: Number of the last earlier run that contains this engine.
         run: Number of the run in which the results changed.
-        results: The changes (worse, better or moved) that `changes.changes` returns, largest first.
+        results: The changes (worse, better, moved or gone) that `changes.changes` returns, largest first.
         attribution: The cause to which the changes are attributed.
     """
 
@@ -174,11 +174,13 @@ def history(runs: Mapping[str, Results]) -> History:
 def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> list[Move]:
     """The runs in which results changed.
 
-    Each result is compared with its value after its last change, so that slow drifts are found, and runs without the result have no effect.
+    Each result is compared with its value after its last change, so that slow drifts are found. Runs that did not request the result have
+    no effect; in the first one in which the engine broke down or declined the scene, it is gone.
     """
     held: dict[str, pd.DataFrame] = {}
     scenes: dict[str, str] = {}
     last: dict[str, int] = {}
+    absent: dict[str, list[tuple[str, ...]]] = {}
     found = []
     for run, one in enumerate(results):
         digests = {name: scene.digest for name, scene in one.scenes.items()}
@@ -186,17 +188,22 @@ def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> li
         scenes |= digests
         held = {engine: rows[~rows["scene"].isin(other)] for engine, rows in held.items()}
         moved = {}
-        for engine, now in ((str(engine), rows) for engine, rows in results_of[run].groupby("engine", sort=False)):
-            before = held.get(engine, now.iloc[:0])
+        for engine in one.engines:
+            now = results_of[run][results_of[run]["engine"] == engine]
+            earlier = held.get(engine, now.iloc[:0])
+            before = asked_for(earlier, one)
             change = changes(before, now)
-            moved[engine] = most_changed_first(change[change["change"].isin(["worse", "moved", "better"])])
+            keys, is_gone = pd.MultiIndex.from_frame(change[KEY]), change["change"] == "gone"
+            is_new = is_gone & ~keys.isin(absent.get(engine, []))
+            absent[engine] = [*set(absent.get(engine, [])).difference(keys), *keys[is_gone]]
+            moved[engine] = most_changed_first(change[change["change"].isin(["worse", "moved", "better"]) | is_new])
             stays = change["change"].isin(["same", "gone", "undefined"])
             kept, fresh = before.merge(change.loc[stays, KEY], on=KEY), now.merge(change.loc[~stays, KEY], on=KEY)
-            held[engine] = pd.concat([kept, fresh], ignore_index=True)
+            held[engine] = pd.concat([earlier.drop(before.index), kept, fresh], ignore_index=True)
         unmoved = [engine for engine, differing in moved.items() if differing.empty and engine in last]
         for engine, differing in moved.items():
             if len(differing):
                 before_it = results[last[engine]]
                 found.append(Move(engine, last[engine], run, differing, _attributed(differing, before_it, one, engine, unmoved)))
-        last |= dict.fromkeys(moved, run)
+        last |= dict.fromkeys(results_of[run]["engine"], run)
     return found

@@ -13,22 +13,25 @@ def dated(*runs):
     """Runs by name, each a day after the one before."""
     return {
         name: replace(one, provenance={**one.provenance, "started": f"2026-01-0{day}"})
-        for day, (name, one) in enumerate(zip("abcd", runs, strict=False), start=1)
+        for day, (name, one) in enumerate(zip("abcde", runs, strict=False), start=1)
     }
 
 
 def test_history_finds_the_run_in_which_results_moved(before, release):
-    """Runs are sorted by time; an engine that broke down in between is followed past that run."""
+    """Runs are sorted by time; of an engine that broke down in between, results are gone once, and it is followed past that run."""
     runs = dated(
         before,
         released(release(Candidate), "1.1"),
         part(release(Broken, "mujoco"), "drop-ball"),
+        replace(part(release(Broken, "mujoco"), "drop-ball")),
         released(release(Euler), "2.0"),
     )
     found = history(dict(reversed(runs.items())))
-    assert found.names == ["a", "b", "c", "d"]
-    [move] = found.moves
-    assert (move.engine, move.before, move.run) == ("candidate", 1, 3)
+    assert found.names == ["a", "b", "c", "d", "e"]
+    lost, move = found.moves
+    assert (lost.engine, lost.before, lost.run, {*lost.results["change"]}) == ("candidate", 1, 2, {"gone"})
+    assert {*lost.results["scene"]} == {"drop-ball"}
+    assert (move.engine, move.before, move.run) == ("candidate", 1, 4)
     assert move.attribution.origin == "engine"
     assert "candidate 1.1 → 2.0" in move.attribution.message
     assert set(move.results["scene"]) >= TURNING

@@ -162,7 +162,7 @@ def _of_column(kind: str, columns: Sequence[tuple[Flight, Array | None, Array]],
         return
     found: list[tuple[Cause | None, ...]] = []
     for in_frame, rates in (((), given), ((frame,), rotate(turned, given)), ((frame,), unrotate(turned, given))):
-        factor = float(np.sum(rates * exact) / np.sum(exact**2))
+        factor = float(np.sum(rates * exact)) / (float(np.sum(exact**2)) or 1.0)
         is_scaled = abs(abs(factor) - 1.0) > ALLOWED
         if factor != 0.0 and explained(rates, factor):
             in_degrees = kind == "spin" and abs(math.radians(abs(factor)) - 1.0) < ALLOWED

@@ -364,6 +364,8 @@ def test_spins_that_differ_by_their_noise_agree(spin: float) -> None:
 def test_spins_of_exactly_zero_agree_with_quaternions_that_do_not_turn() -> None:
     log = changed(made(1, 5, spin=0.0, header={"body": CUBE}).log, angular_velocity=lambda toss: np.zeros_like(toss.position))
     assert not [found for found in log_check(log).findings if found.kind == "spin"]
+    found = only(log_check(changed(log, angular_velocity=lambda toss: np.ones_like(toss.position))))
+    assert (found.kind, found.causes) == ("spin", ())
 
 
 def test_a_short_sound_recording_has_no_finding() -> None:

@@ -25,7 +25,7 @@ class Recompiled:
     """The models, with their data, that follow from a specification by changes; None if MuJoCo refuses one.
 
     Args:
-        spec: The specification, which stays as it is.
+        spec: The specification; it is not changed.
     """
 
     def __init__(self, spec: Any) -> None:

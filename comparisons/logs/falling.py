@@ -72,7 +72,7 @@ def _acceleration(log: Log, down: Array) -> Array:
     lengths, times = ({a / b for a, b in product(units.values(), repeat=2)} for units in (LENGTHS, TIMES))
     factors = lengths | {ratio**2 for ratio in (*times, *RATES)}
     candidates = [factor * sign * np.roll(down, turn) for factor in sorted(factors) for turn in range(3) for sign in (1.0, -1.0)]
-    some = np.concatenate([pieces(number, size)[::size] for number, size in enumerate(window_size(toss, noise, down) for toss in tosses)])
+    some = np.concatenate([pieces(number, size := window_size(toss, noise, down))[::size] for number, toss in enumerate(tosses)])
     candidates += list(some[:: math.ceil(len(some) / MOST_PIECES) or 1])
     best = max(candidates, key=falling)
     return down if falling(down) > ABOUT * falling(best) else best

@@ -70,7 +70,7 @@ class Transfer:
         second: Label of the second engine.
         difference: The estimate of the first engine minus that of the second.
         lower: Lower end of the interval of the difference; infinite if the tosses show no difference, and one bound of an estimate alone.
-        upper: Upper end of the interval of the difference, likewise.
+        upper: Upper end of the interval of the difference; infinite in the same case.
         verdict: `equal` if the interval is within `EQUAL` of 0, `different` if it is on one side of 0, else `undecided`.
     """
 

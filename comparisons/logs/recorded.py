@@ -73,14 +73,12 @@ def of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
         found = [one for one in readings if one[1] > NEARLY and one[0] < 2.0 * turns]
     if found:
         least = min(left for left, _, _ in found)
-        left, share, _ = max((one for one in found if one[0] <= EQUALLY * least), key=lambda one: one[1])
-        causes: list[Cause] = []
-        for other, level_then, cause in found:
-            if other <= EQUALLY * least and not level_then < NEARLY * share and cause not in causes:
-                causes.append(cause)
+        best = [one for one in found if one[0] <= EQUALLY * least]
+        left, share, _ = max(best, key=lambda one: one[1])
+        causes = [cause for _, of_reading, cause in best if not of_reading < NEARLY * share]
         are_read = any(cause.name != "body axes" for cause in causes)
         kind, value, expected = ("quaternion", level, share) if are_read else ("body axes", turns, left)
-        yield Finding(kind, value, expected, causes=tuple(causes))
+        yield Finding(kind, value, expected, causes=tuple(cause for number, cause in enumerate(causes) if cause not in causes[:number]))
     elif flights.turning.noise.white > UNTRACKED:
         yield Finding("rotation", flights.turning.noise.white, 0.0)
 

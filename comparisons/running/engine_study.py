@@ -34,7 +34,7 @@ from dropspin.comparisons.running.ablation import explaining, written_out
 from dropspin.comparisons.running.engine_run import EngineRun, run_engine
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.perturbed_starts import metrics_from_each_set, number_of_sets
+from dropspin.comparisons.running.perturbed_starts import changes_of_metrics, number_of_simulations
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress
 from dropspin.comparisons.running.recording import Breakdown, divergence
@@ -106,7 +106,7 @@ class EngineStudy:
         scene, dt, run, size = self.own.scene, progress.dt, EngineRun(entry.label), len(phases)
         if not timing.ended:
             starts = [phase.scene for phase in phases]
-            perturbed = size * number_of_sets(self.own, entry.adapter.precision, size) if perturbs else 0
+            perturbed = number_of_simulations(self.own, entry.adapter.precision, size) if perturbs else 0
 
             def on_simulations(done: int, total: int) -> None:
                 self.on_progress(progress._replace(done=done, total=total and total + perturbed))
@@ -115,7 +115,7 @@ class EngineStudy:
             run = EngineRun(entry.label, answer) if isinstance(answer, Breakdown) else answer
         motions = [] if run.motion is None else [run.motion, *run.phases]
         run.breakdown = run.breakdown or timing.breakdown or next(filter(None, map(divergence, motions)), None)
-        cases, around = [] if run.breakdown else compare(run.phases, phases), []
+        cases, changes = [] if run.breakdown else compare(run.phases, phases), []
         if cases and perturbs:
             before = size + (size > 1)
 
@@ -123,10 +123,10 @@ class EngineStudy:
                 self.on_progress(progress._replace(done=before + done, total=before + perturbed))
 
             try:
-                around = metrics_from_each_set(self.own, entry, phases, dt, run.precision, self.processes, on_perturbed)
+                changes = changes_of_metrics(self.own, entry, phases, cases, dt, run.precision, self.processes, on_perturbed)
             except Breakdown as breakdown:
                 run.breakdown, cases = breakdown, []
-        points = measure(self.own, dt, run, cases, around) if cases else {}
+        points = measure(self.own, dt, run, cases, changes) if cases else {}
         digest = motion_digest(motions) if motions else ""
         case = Case(scene.name, entry.label, dt, scene.steps(dt))
         return Outcome(case, timing.per_step, replace(run, phases=[]), points, digest), cases

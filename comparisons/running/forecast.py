@@ -9,7 +9,7 @@ import numpy as np
 from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.perturbed_starts import number_of_sets
+from dropspin.comparisons.running.perturbed_starts import number_of_simulations
 from dropspin.comparisons.running.start_phases import StartPhase, number_of_phases
 from dropspin.comparisons.running.timing import Timing
 from dropspin.comparisons.running.uncertainty import simulations_of
@@ -78,4 +78,4 @@ def simulations(own: StartPhase, entry: EngineEntry, dt: float) -> int:
         tosses = phases // PHASES_OF_TOSS
         return 1 + phases + tosses * simulations_of(tosses)
     members = 0 if scene.ensemble is None else min(scene.ensemble.size, QUICK_MEMBERS) if own.quick else scene.ensemble.size
-    return 1 + (phases if phases > 1 else 0) + number_of_sets(own, entry.adapter.precision, phases) * phases + members
+    return 1 + (phases if phases > 1 else 0) + number_of_simulations(own, entry.adapter.precision, phases) + members

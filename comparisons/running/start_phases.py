@@ -116,9 +116,9 @@ def compare(motions: Sequence[Trajectory], phases: Sequence[StartPhase]) -> list
 
 
 def measure(
-    own: StartPhase, dt: float, run: EngineRun, cases: Sequence[Comparison], around: Sequence[Mapping[str, float]]
+    own: StartPhase, dt: float, run: EngineRun, cases: Sequence[Comparison], changes: Sequence[Mapping[str, float]]
 ) -> dict[str, SeriesPoint]:
-    """Every metric of one engine at one time step, by name; `around`: from each set of perturbed starts."""
+    """Every metric of one engine at one time step, by name; `changes`: of each metric, with each set of perturbed starts."""
     scene, quick, precision = own.scene, own.quick, run.precision
     steps, found = scene.steps(dt), {}
     for metric in metrics_for(scene, own.truth):
@@ -132,7 +132,7 @@ def measure(
         if quick and len(cases) > 1:
             average, components = average.less_certain(QUICK_NOISE), components and components.less_certain(QUICK_NOISE)
             noise = np.inf if metric.name in JUMPING else average.noise
-        moved = float(np.max([abs(values[metric.name] - average.value) for values in around], initial=0.0))
+        moved = float(np.max([change[metric.name] for change in changes], initial=0.0))
         sampling_noise = FEW_DRAWS * moved if len(cases) == 1 else average.jump + moved
         noise = max(noise, run.uncertainties.get(metric.name, 0.0))
         allowed = tolerance(scene, metric.unit, precision, steps, sampling_noise)

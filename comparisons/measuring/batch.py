@@ -60,7 +60,9 @@ def compute_cases(cases: Sequence[Comparison]) -> None:
     setup, has_residuals = Setup.of(scene), obeys_contact_laws(scene, None)
     for case, origin, clearance in zip(cases, starts.origin, starts.clearance, strict=True):
         started, last_row = replace(setup, origin=origin, clearance=np.asarray(clearance)), np.asarray(len(case.motion) - 1)
-        vars(case)["motions"] = Motions(started, States(case.scene, case.motion), np.asarray(case.dt), last_row)
+        vars(case).update(
+            motions=Motions(started, States(case.scene, case.motion), np.asarray(case.dt), last_row), clearance=float(clearance)
+        )
     for numbers, states, together in compute_states([case.states for case in cases]):
         residuals = contact_residuals(scene, states, together) if has_residuals else None
         for number, case in enumerate(cases[numbers]):

@@ -2,7 +2,7 @@
 
 import html
 from collections import ChainMap
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -96,10 +96,23 @@ class Results:
         texts: dict[str, Any] = dict.fromkeys(self.table.select_dtypes("str"), object)
         frames = {name: getattr(self, name).astype(texts) for name in FRAMES}
         rows = {name: dict(iter(frame.groupby("scene"))) for name, frame in frames.items()}
-        return {
+        parts = {
             scene: replace(self, scenes={scene: self.scenes[scene]}, **{name: rows[name].get(scene, frames[name][:0]) for name in FRAMES})
             for scene in self.scenes
         }
+        for part in parts.values():
+            vars(part)["undecided"] = self.undecided[part.table.index]
+        return parts
+
+    @cached_property
+    def rows(self) -> list[dict[Hashable, Any]]:
+        """The rows of `table`, converted once: in a report that takes longer than all that is done with them."""
+        return self.table.to_dict("records")
+
+    @cached_property
+    def undecided(self) -> "pd.Series[bool]":
+        """For each row of `table`, whether `is_undecided` holds."""
+        return is_undecided(self.table)
 
     def __repr__(self) -> str:
         return f"<Results: {self._title}>"
@@ -145,7 +158,7 @@ class Results:
         of_rows = {
             "severity": verdicts.map(VERDICTS.index).where(~(is_small | explains_nothing | is_law)),
             "of_model": (verdicts == "known") & (table["cause"] == "model"),
-            "undecided": is_undecided(table) & ~table["metric"].isin(JUMPING) & ~recorded,
+            "undecided": self.undecided & ~table["metric"].isin(JUMPING) & ~recorded,
         }
         by_pair = table[["scene", "engine"]].assign(**of_rows).groupby(["scene", "engine"])
         found = {

@@ -105,7 +105,7 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
     ensemble = finest[finest["metric"].isin(order)]  # the means, followed by the differences between engines
     studies, uncertain = frame[frame["kind"].isin(STUDIES)], frame[frame["kind"] == "uncertainty"]
     motions = replay_of(results, name)
-    budgets = error_budgets(results, name)
+    budgets = error_budgets(results)
     convergence = [line for chart in charts.get("convergence", ()) for line in chart.lines]
     return {
         "id": f"scene-{number:02d}",
@@ -118,7 +118,7 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
         "truth": truth,
         "dts": dts,
         "metrics": list(own["metric"].unique()),
-        "cells": {(row["metric"], row["engine"], row["dt"]): row for row in own.to_dict("records")},
+        "cells": {(row["metric"], row["engine"], row["dt"]): row for row in results.rows if row["kind"] in ("truth", "invariant")},
         "uncertainties": uncertain.set_index(["metric", "engine", "dt"])["value"].to_dict(),
         "trends": _trends(studies),
         "budgets": [budget for budget in budgets if budget["cause"] != "discretisation"],

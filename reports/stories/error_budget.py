@@ -4,26 +4,27 @@ import math
 from collections.abc import Hashable, Mapping
 from typing import Any
 
+import numpy as np
+
 from dropspin.comparisons.judging.convergence import ARTEFACTS, SATURATION
 from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY
-from dropspin.comparisons.results.results import SMALLEST_STATED, Results, is_undecided
+from dropspin.comparisons.results.results import SMALLEST_STATED, Results
 from dropspin.reports.stories.numbers import Row, formatted, observed_order
 
 EXPLAINED = {"known": "Expected", "limited": "Known limitation"}
 """The words before the reason of an expected model error, by verdict."""
 
 
-def error_budgets(results: Results, scene_name: str) -> list[dict[Hashable, Any]]:
-    """The errors of a scene at the finest time step, by metric, for engines that ran at enough time steps.
+def error_budgets(results: Results) -> list[dict[Hashable, Any]]:
+    """The errors of a run of one scene at the finest time step, by metric, for engines that ran at enough time steps.
 
     Negligible errors that vanish as dt → 0 are left out. A row has the columns of the error, of its asymptotic error (names that end in
     `_of_limit`) and of its order (`_of_order`), which are NaN if undefined; the cause to which the error is attributed; and a sentence.
     """
-    table = results.table[results.table["scene"] == scene_name]
-    rows = table.assign(undecided=is_undecided(table)).to_dict("records")
+    rows = results.rows
     errors = [row for row in rows if row["kind"] in ("truth", "invariant") and row["metric"] not in ARTEFACTS]
     limits, orders = ({_pair(row): row for row in rows if row["kind"] == kind} for kind in ("asymptotic_error", "order"))
-    undecided, judged = {_pair(row) for row in rows if row["undecided"]}, {engine for _, engine in limits}
+    undecided, judged = {_pair(rows[n]) for n in np.flatnonzero(results.undecided)}, {engine for _, engine in limits}
     finest = min((row["dt"] for row in errors), default=math.nan)
     places = {metric: number for number, metric in enumerate(dict.fromkeys(row["metric"] for row in errors))}
     budgets = []

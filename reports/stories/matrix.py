@@ -11,7 +11,7 @@ from dropspin.comparisons.judging.verdicts import FAILURES, VERDICTS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.conclusion import WITHIN
-from dropspin.comparisons.results.results import MODEL_ERROR, UNDECIDED, Results, Status, is_undecided
+from dropspin.comparisons.results.results import MODEL_ERROR, UNDECIDED, Results, Status
 from dropspin.reports.stories.numbers import Row, bound, capitalized, in_ms, quantity, short, sized, with_unit
 
 MOST_SCENES = 18
@@ -134,7 +134,7 @@ def _explanation(results: Results, errors: pd.DataFrame, engine: str, status: St
         trends = mine[(mine["kind"] == "asymptotic_error") & (mine["metric"] == metric)]
         sentences += ["every check of the scene is within its bound", *(f"as dt → 0: {reason}" for reason in trends["reason"])]
     else:
-        decisive = mine[is_undecided(mine) if status.reason == UNDECIDED else mine["verdict"] == status.verdict]
+        decisive = mine[results.undecided[mine.index] if status.reason == UNDECIDED else mine["verdict"] == status.verdict]
         order = decisive["metric"].map({metric: 0, "": 2}).fillna(1)
         first = decisive.loc[order.sort_values(kind="stable").index[:1]].to_dict("records")
         reasons = [f"{quantity(row['metric'])}: {row['reason']}".removeprefix(": ") for row in first]

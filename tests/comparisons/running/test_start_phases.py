@@ -6,8 +6,11 @@ import pytest
 import dropspin as ds
 from dropspin.comparisons.measuring.batch import AT_ONCE, compute_states
 from dropspin.comparisons.measuring.states import States
+from dropspin.comparisons.running.engine_run import motions_from
+from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import MOST_ROWS
-from dropspin.comparisons.running.start_phases import START_PHASES, StartPhase, number_of_phases, phases_at
+from dropspin.comparisons.running.perturbed_starts import PERTURBED_PHASES, changes_of_metrics, number_of_simulations
+from dropspin.comparisons.running.start_phases import START_PHASES, StartPhase, compare, number_of_phases, phases_at
 
 DT = 4e-3
 SCENES = ("drop-box-flat", "spin-asymmetric", "roll-prism", "slide-box")
@@ -62,3 +65,22 @@ def test_long_scenes_have_fewer_start_phases():
     assert (counts[1e-3], counts[2e-6]) == (START_PHASES, 1)
     assert 1 < counts[1e-4] < START_PHASES
     assert counts[1e-4] * scene.steps(1e-4) <= MOST_ROWS
+
+
+@pytest.mark.usefixtures("all_start_phases")
+def test_metrics_from_perturbed_starts_are_compared_with_those_from_the_same_phases():
+    """If a perturbation changed nothing, no metric would change."""
+    scene, entry, asked = ds.load("roll-prism"), engine_entry("wang"), []
+    own = StartPhase(scene, ds.truth_for(scene))
+    phases = phases_at(own, DT)
+    motions = motions_from(entry, [phase.scene for phase in phases], DT, lambda *_: None)
+
+    class WithoutEffect:
+        def call(self, entry, work, starts, dt, on_simulations):
+            asked.extend(starts)
+            return motions[:: START_PHASES // PERTURBED_PHASES] * 2
+
+    changes = changes_of_metrics(own, entry, phases, compare(motions, phases), DT, np.float64, WithoutEffect(), lambda _: None)
+    assert len(changes) == 2
+    assert {change for of_set in changes for change in of_set.values()} == {0.0}
+    assert len(asked) == number_of_simulations(own, np.float64, len(phases)) == 2 * PERTURBED_PHASES

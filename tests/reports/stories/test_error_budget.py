@@ -1,24 +1,19 @@
 """Error budgets in words, of results that are made up so that the asymptotic error is known."""
 
 import math
-from dataclasses import dataclass
 
-import pandas as pd
 import pytest
 
+from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.table import Measurement, as_table
 from dropspin.reports.stories.error_budget import error_budgets
 
 
-@dataclass(frozen=True)
-class Made:
-    """As much of a run as the budget needs: one engine's error at the finest step, and its extrapolation."""
-
-    table: pd.DataFrame
-
-
 def made(value, unit="1", asymptotic=None, order=None, spread=0.5, judged="measured"):
-    """A run with this error; `asymptotic` is its asymptotic error, the interval's ends and the cause; `spread` is the order's."""
+    """A run of one engine with this error at the finest step.
+
+    `asymptotic` is its asymptotic error, the interval's ends and the cause; `spread` is the order's.
+    """
     metric = "orientation_error" if unit == "rad" else "energy_error"
 
     def row(metric=metric, **content):
@@ -32,11 +27,11 @@ def made(value, unit="1", asymptotic=None, order=None, spread=0.5, judged="measu
         rows.append(row(kind="asymptotic_error", value=error, lower=lower, upper=upper, cause=cause, reason=reason, verdict=judged))
     if order is not None:
         rows.append(row(kind="order", value=order, lower=order - spread, upper=order + spread))
-    return Made(as_table(rows))
+    return Results(as_table(rows), {}, ("made",), {})
 
 
 def budget(results):
-    [found] = error_budgets(results, "made")
+    [found] = error_budgets(results)
     return found
 
 
@@ -95,4 +90,4 @@ def test_interval_is_stated():
 
 def test_negligible_errors_are_left_out():
     """Errors below the size that summaries mention have no budget."""
-    assert error_budgets(made(1e-5, asymptotic=(1e-5, -1e-9, 1e-9, "model")), "made") == []
+    assert error_budgets(made(1e-5, asymptotic=(1e-5, -1e-9, 1e-9, "model"))) == []

@@ -69,13 +69,13 @@ def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
 def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], worlds: int) -> list[float]:
     """Wall time per simulated second and world [s/s] of a batch at each time step, as by `cost`; NaN if its states are not finite.
 
-    In free flight a step takes the same time at any dt. With a floor, runs that are too long, judged by their first steps, are not timed.
+    With a floor, runs that are too long, judged by their first steps, are not timed.
 
     Raises:
         Breakdown: The engine cannot simulate batches.
     """
     times = []
-    for dt in dts[-1:] if scene.floor is None else dts:
+    for dt in dts:
         timed, steps = partial(_finite, time_steps, entry.adapter, [scene] * worlds, dt), scene.steps(dt)
         times.append(math.nan)
         with suppress(Diverged):
@@ -84,7 +84,7 @@ def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], w
                 times[-1] = time_per_step(timings_in_flight(timed, FIRST_STEPS_OF_A_BATCH, 1, BATCH_SECONDS))
             elif timed(FIRST_STEPS).stepping * steps <= LONGEST_BATCH * FIRST_STEPS:
                 times[-1] = time_per_step([timed(steps)])
-    return [per_step / (dt * worlds) for dt, per_step in zip(dts, times * (len(dts) // len(times)), strict=True)]
+    return [per_step / (dt * worlds) for dt, per_step in zip(dts, times, strict=True)]
 
 
 def _finite(time_them: Callable[..., TimedSteps], *args: Any) -> TimedSteps:

@@ -150,11 +150,11 @@ class CostlyCalls(Exact):
 
 
 class CostlyBatch(BatchSimulation):
-    def __init__(self, engine, members):
-        self._engine, self._members = engine, members
+    def __init__(self, engine, members, substeps=1):
+        self._engine, self._members, self._substeps = engine, members, substeps
 
     def advance(self, steps):
-        self._engine.pass_time(steps * len(self._members))
+        self._engine.pass_time(steps * self._substeps * len(self._members))
 
     def states(self):
         return np.array([member.initial_state for member in self._members])
@@ -167,6 +167,20 @@ def test_cost_of_a_step_in_flight_is_without_that_of_the_call(monkeypatch, dt):
     entry = EngineEntry("costly-calls", CostlyCalls())
     assert costs.cost(entry, SPIN, dt) == pytest.approx(STEP / dt, rel=1e-9)
     assert costs.costs_per_world(entry, SPIN, [dt, 2 * dt], 4) == pytest.approx([STEP / dt, STEP / (2 * dt)], rel=1e-9)
+
+
+class Substeps(CostlyCalls):
+    """Divides each step into equal ones of 1 ms."""
+
+    def prepare_batch(self, members, dt):
+        return CostlyBatch(self, members, round(1e3 * dt))
+
+
+def test_cost_per_world_of_an_engine_that_divides_its_steps(monkeypatch):
+    """It is the same at all steps, and timed at each: it is not derived from that at the smallest."""
+    monkeypatch.setattr(timing.time, "perf_counter", lambda: CostlyCalls.clock)
+    entry = EngineEntry("substeps", Substeps())
+    assert costs.costs_per_world(entry, SPIN, [1e-2, 1e-3], 4) == pytest.approx([STEP / 1e-3] * 2, rel=1e-9)
 
 
 @pytest.fixture(scope="module")

@@ -104,9 +104,9 @@ class Results:
             vars(part)["undecided"] = self.undecided[part.table.index]
         return parts
 
-    @cached_property
+    @property
     def rows(self) -> list[dict[Hashable, Any]]:
-        """The rows of `table`, converted once: in a report that takes longer than all that is done with them."""
+        """The rows of `table` as dictionaries, from which some are selected faster than by pandas if the run is of one scene."""
         return self.table.to_dict("records")
 
     @cached_property

@@ -11,7 +11,6 @@ No tolerance is a share of the value: an engine that is exact to 1e-12 is compar
 """
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -23,13 +22,6 @@ NEGLIGIBLE = 3e-8
 MATTERS = 1e-5
 """Errors below this, relative to the metric's scale, do not matter to any use of an engine: contact solvers stop at such residuals."""
 EPS_PER_STEP = 16.0
-PERTURBATION = 16.0
-"""Perturbation of each number of an initial state, in eps of the engine's precision, by which the effect of rounding is measured."""
-_FIRST, _SECOND = np.random.default_rng(0).choice([-1.0, 1.0], (2, 13))
-SIGNS = (_FIRST, -_FIRST, _SECOND, -_SECOND)
-"""The signs of the perturbations: two random sets and their opposites."""
-SETS_OF_STARTS = 2
-"""Number of perturbations of many initial states at a time."""
 FEW_DRAWS = 10.0
 """Factor on the largest effect of a few perturbations, because others may have ten times the effect."""
 TRUTH_ACCURACY = 1e-12
@@ -53,28 +45,6 @@ def tolerance(scene: Scenario, unit: str, precision: type, steps: int, sampling_
     residual = 0.0 if scene.floor is None else NEGLIGIBLE
     rounded = EPS_PER_STEP * float(np.finfo(precision).eps) * math.sqrt(steps)
     return sampling_noise + scale(scene, unit) * (residual + TRUTH_ACCURACY + rounded)
-
-
-def perturbed(scene: Scenario, starts: Sequence[Scenario], precision: type) -> list[list[Scenario]]:
-    """The initial states of a scene perturbed by a few eps, in sets; empty if there are many initial states and none touches the floor.
-
-    The height and the orientation of a body that touches the floor are perturbed by eps of double precision, because those of single
-    precision would lift it or sink it. The sign of the perturbation then decides whether all of the initial states touch the floor or
-    none, so each set of perturbations is followed by its opposite.
-    """
-    if len(starts) == 1:
-        return [[_moved(scene, signs, precision)] for signs in SIGNS]
-    if scene.floor is None or scene.starts_above_floor:
-        return []
-    # It rolls about its corner: perturbed by eps of single precision it would slip, which is another motion.
-    return [[_moved(start, signs, np.float64) for start in starts] for signs in SIGNS[:SETS_OF_STARTS]]
-
-
-def _moved(scene: Scenario, signs: Array, precision: type) -> Scenario:
-    start, sizes = scene.initial_state, np.full(13, PERTURBATION * float(np.finfo(precision).eps))
-    if scene.floor is not None and not scene.starts_above_floor:
-        sizes[: 7 if scene.wall else 0] = sizes[[1, 3, 4, 5, 6]] = PERTURBATION * float(np.finfo(float).eps)
-    return scene.starting_at(start * (1.0 + sizes * signs))
 
 
 def scale(scene: Scenario, unit: str) -> float:

@@ -7,15 +7,45 @@ import numpy as np
 
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import metrics_for
-from dropspin.comparisons.measuring.tolerances import SETS_OF_STARTS, SIGNS, perturbed
 from dropspin.comparisons.running.engine_run import motions_from
 from dropspin.comparisons.running.inputs import MOST_ROWS, EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.running.start_phases import StartPhase, compare
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.state import Array
 
+PERTURBATION = 16.0
+"""Perturbation of each number of an initial state, in eps of the engine's precision, by which the effect of rounding is measured."""
+_FIRST, _SECOND = np.random.default_rng(0).choice([-1.0, 1.0], (2, 13))
+SIGNS = (_FIRST, -_FIRST, _SECOND, -_SECOND)
+"""The signs of the perturbations: two random sets and their opposites."""
+SETS_OF_STARTS = 2
+"""Number of perturbations of many initial states at a time."""
 PERTURBED_PHASES = 8
 """Start phases from which perturbed motions are simulated. The mean over a part of the phases changes at least as much as that over all."""
+
+
+def perturbed(scene: Scenario, starts: Sequence[Scenario], precision: type) -> list[list[Scenario]]:
+    """The initial states of a scene perturbed by a few eps, in sets; empty if there are many initial states and none touches the floor.
+
+    The height and the orientation of a body that touches the floor are perturbed by eps of double precision, because those of single
+    precision would lift it or sink it. The sign of the perturbation then decides whether all of the initial states touch the floor or
+    none, so each set of perturbations is followed by its opposite.
+    """
+    if len(starts) == 1:
+        return [[_moved(scene, signs, precision)] for signs in SIGNS]
+    if scene.floor is None or scene.starts_above_floor:
+        return []
+    # It rolls about its corner: perturbed by eps of single precision it would slip, which is another motion.
+    return [[_moved(start, signs, np.float64) for start in starts] for signs in SIGNS[:SETS_OF_STARTS]]
+
+
+def _moved(scene: Scenario, signs: Array, precision: type) -> Scenario:
+    start, sizes = scene.initial_state, np.full(13, PERTURBATION * float(np.finfo(precision).eps))
+    if scene.floor is not None and not scene.starts_above_floor:
+        sizes[: 7 if scene.wall else 0] = sizes[[1, 3, 4, 5, 6]] = PERTURBATION * float(np.finfo(float).eps)
+    return scene.starting_at(start * (1.0 + sizes * signs))
 
 
 def are_left_out(own: StartPhase, precision: type) -> bool:

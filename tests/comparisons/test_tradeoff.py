@@ -169,6 +169,22 @@ def test_cost_of_a_step_in_flight_is_without_that_of_the_call(monkeypatch, dt):
     assert costs.costs_per_world(entry, SPIN, [dt, 2 * dt], 4) == pytest.approx([STEP / dt, STEP / (2 * dt)], rel=1e-9)
 
 
+class SlowStart(CostlyCalls):
+    """The first call of each simulation does work that takes as long as a thousand steps."""
+
+    def prepare(self, scene, dt):
+        made = super().prepare(scene, dt)
+        advance, extra = made.advance, [8e-3]
+        made.advance = lambda steps: (self.pass_time(extra.pop() / STEP if extra else 0), advance(steps))
+        return made
+
+
+def test_work_that_a_simulation_does_once_is_no_part_of_its_steps(monkeypatch):
+    monkeypatch.setattr(timing.time, "perf_counter", lambda: CostlyCalls.clock)
+    timed = timing.time_steps(SlowStart(), SPIN, 1e-3, 3000)
+    assert timing.time_per_step([timed]) == pytest.approx(STEP, rel=1e-9)
+
+
 class Substeps(CostlyCalls):
     """Divides each step into equal ones of 1 ms."""
 
@@ -459,7 +475,7 @@ def test_front_that_the_rounds_do_not_decide_is_undecided():
 
 
 class Disturbed(Exact):
-    """An engine on a machine whose other load makes two of three calls ten times as slow, by a clock of its own."""
+    """An engine on a machine whose other load makes every second call ten times as slow, by a clock of its own."""
 
     name = "disturbed"
 
@@ -471,7 +487,7 @@ class DisturbedSimulation(ExactSimulation):
     def advance(self, steps):
         super().advance(steps)
         CLOCK["calls"] += 1
-        CLOCK["now"] += STEP * steps * (1.0 if CLOCK["calls"] % 3 == 0 else 10.0)
+        CLOCK["now"] += STEP * steps * (1.0 if CLOCK["calls"] % 2 == 0 else 10.0)
 
 
 CLOCK = {"now": 0.0, "calls": 0}

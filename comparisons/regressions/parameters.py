@@ -4,12 +4,12 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.damping import Damping
 from dropspin.scenarios.rotations import about, rotate
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.variations import with_values
 
 Change = Callable[[Scenario, float], Scenario]
@@ -38,14 +38,9 @@ def _scaled(table: str, name: str) -> Change:
     return change
 
 
-def _with_gravity(scene: Scenario, acceleration: NDArray[np.float64]) -> Scenario:
-    if scene.gravity is None:
-        return scene
-    return scene.model_copy(update={"gravity": scene.gravity.model_copy(update={"acceleration": tuple(map(float, acceleration))})})
-
-
-def _tilted(axis: tuple[float, float, float]) -> Change:
-    return lambda scene, angle: _with_gravity(scene, rotate(about(np.array(axis), np.array(angle)), scene.acceleration))
+def _gravity(change: Callable[[Array, float], Array]) -> Change:
+    """A change of the acceleration of gravity, if there is any."""
+    return lambda scene, size: with_values(scene, "gravity", acceleration=change(scene.acceleration, size).tolist())
 
 
 def _added_damping(which: str) -> Change:
@@ -74,9 +69,9 @@ def _moments(*wrong: int) -> Change:
 PARAMETERS = (
     Parameter("restitution", "1", _scaled("floor", "restitution")),
     Parameter("Coulomb coefficient", "1", _scaled("floor", "friction")),
-    Parameter("gravity", "1", lambda scene, share: _with_gravity(scene, (1.0 + share) * scene.acceleration)),
-    Parameter("direction of gravity", "rad", _tilted((1.0, 0.0, 0.0))),
-    Parameter("direction of gravity", "rad", _tilted((0.0, 0.0, 1.0))),
+    Parameter("gravity", "1", _gravity(lambda g, share: (1.0 + share) * g)),
+    Parameter("direction of gravity", "rad", _gravity(lambda g, angle: rotate(about(np.array([1.0, 0.0, 0.0]), np.array(angle)), g))),
+    Parameter("direction of gravity", "rad", _gravity(lambda g, angle: rotate(about(np.array([0.0, 0.0, 1.0]), np.array(angle)), g))),
     Parameter("linear damping", "1", _scaled("damping", "linear")),
     Parameter("angular damping", "1", _scaled("damping", "angular")),
     Parameter("linear damping", "1/s", _added_damping("linear")),

@@ -212,15 +212,13 @@ def measure(bugs: Collection[Bug], folder: Path, *, jobs: int, on_done: Callable
         The outcomes of each report, by its name, in the order of its releases.
     """
     stopping = Event()
-    pieces = [(bug, release) for bug in bugs for release in bug.releases]
+    pieces = ((bug, release) for bug in bugs for release in bug.releases)
     outcomes: dict[tuple[str, str], Outcome] = {}
-    with ThreadPoolExecutor(jobs) as threads:
+    with ThreadPoolExecutor(jobs) as pool:
         try:
-            for done in as_done(threads, lambda piece: _outcome(*piece, folder, stopping), iter(pieces), lambda: jobs):
-                if done is not None:
-                    (bug, release), outcome = done
-                    outcomes[bug.name, release] = outcome
-                    on_done(bug, outcome)
+            for (bug, release), outcome in filter(None, as_done(pool, lambda one: _outcome(*one, folder, stopping), pieces, lambda: jobs)):
+                outcomes[bug.name, release] = outcome
+                on_done(bug, outcome)
         finally:
             stopping.set()
     return {bug.name: [outcomes[bug.name, release] for release in bug.releases] for bug in bugs}

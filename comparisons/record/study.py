@@ -69,14 +69,13 @@ def record(
             if not any(record.has(engine, release, common[engine] | one) for one in machines)
         ]
         stopping, left = None if scheduler else Event(), len(pending)
+        work = partial(_measured, plan, time_limit, stopping)
         try:
-            for done in as_done(workers, partial(_measured, plan, time_limit, stopping), iter(pending), lambda: len(pending)):
-                if done is not None:
-                    (engine, release), (rows, measured_on) = done
-                    record.write(engine, release, rows, common[engine] | measured_on)
-                    left -= 1
-                    results = sum(bool(row.get("metric")) for row in rows)
-                    on_done(f"{engine} {release}: {f'{results} results' if results else rows[0]['reason']}", left)
+            for (engine, release), (rows, measured_on) in filter(None, as_done(workers, work, iter(pending), lambda: len(pending))):
+                record.write(engine, release, rows, common[engine] | measured_on)
+                left -= 1
+                results = sum(bool(row.get("metric")) for row in rows)
+                on_done(f"{engine} {release}: {f'{results} results' if results else rows[0]['reason']}", left)
         finally:
             if stopping is not None:
                 stopping.set()

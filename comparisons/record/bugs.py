@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 from threading import Event
 from typing import Literal, NamedTuple
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel
 
 from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.engines.packages import version
@@ -112,8 +112,8 @@ class Outcome(BaseModel):
 
     release: str
     state: State
-    value: float = Field(default=float("nan"))
-    right: float = Field(default=float("nan"))
+    value: float = math.nan
+    right: float = math.nan
     said: str = ""
 
 

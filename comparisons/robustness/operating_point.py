@@ -48,7 +48,7 @@ def falls(scene: Scenario) -> bool:
     return scene.starts_above_floor and bool(scene.acceleration[1] < 0.0)
 
 
-def of_scene(change: Callable[[Scenario, float], Scenario]) -> Callable[["OperatingPoint", float], "OperatingPoint"]:
+def of_scene(change: Callable[[Scenario, float], Scenario]) -> Callable[[OperatingPoint, float], OperatingPoint]:
     """The operating points whose scene is changed by a value, at the same time step."""
     return lambda nominal, value: nominal._replace(scene=change(nominal.scene, value))
 

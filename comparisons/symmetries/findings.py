@@ -6,6 +6,7 @@ recent effect of the perturbations, times a factor that allows for a rounding er
 that of a contact that is missed at the start, explains no later difference. Repeated runs must be equal bit for bit.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal, get_args
@@ -66,9 +67,9 @@ class Finding:
     engine: str
     symmetry: str
     status: Status
-    difference: float = float("nan")
+    difference: float = math.nan
     step: int | None = None
-    time: float = float("nan")
+    time: float = math.nan
     reason: str = ""
     verdict: Verdict | Literal[""] = ""
     motions: Annotated[tuple[Array, Array] | None, PlainValidator(lambda motions: None), Field(exclude=True)] = field(

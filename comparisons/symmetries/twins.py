@@ -5,6 +5,7 @@ for symmetries, a difference is attributed to rounding as long as perturbations 
 in one of the two engines.
 """
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -55,8 +56,8 @@ class TwinFinding:
     twin: str
     status: Status
     first: int | None = None
-    before_contact: float = float("nan")
-    after_contact: float = float("nan")
+    before_contact: float = math.nan
+    after_contact: float = math.nan
     beyond: dict[float, int | None] = field(default_factory=dict)
     unexplained: int | None = None
     reason: str = ""
@@ -133,7 +134,7 @@ def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene:
             status=judgement.status,
             first=_first((first != second).any(axis=1)),
             before_contact=float(difference[:until].max()),
-            after_contact=float(difference[until:].max(initial=-np.inf)) if until < len(difference) else float("nan"),
+            after_contact=float(difference[until:].max(initial=-np.inf)) if until < len(difference) else math.nan,
             beyond={level: _first(difference > level) for level in LEVELS},
             unexplained=judgement.step,
         )

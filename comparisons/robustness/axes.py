@@ -102,17 +102,9 @@ class Axis(NamedTuple):
         return self.name if self.unit == "1" else f"{self.name} [{self.unit}]"
 
 
-def _has_principal_axes(scene: Scenario) -> bool:
-    return may_tumble(scene) and not scene.body.is_ball and is_diagonal(scene.body.inertia_tensor)
-
-
 def _inertia_ratio(nominal: OperatingPoint) -> float:
     moments = np.linalg.eigvalsh(nominal.scene.body.inertia_tensor)
     return float(moments[2] / moments[0])
-
-
-def _restitution(nominal: OperatingPoint) -> float:
-    return math.nan if nominal.scene.floor is None else nominal.scene.floor.restitution
 
 
 AXES = {
@@ -132,7 +124,7 @@ AXES = {
         Axis(
             "inertia-ratio", "1", lambda nominal: logarithmic(1.0, 1e6, 7), _inertia_ratio,
             to.of_scene(with_inertia_ratio),
-            applies=_has_principal_axes,
+            applies=lambda scene: may_tumble(scene) and not scene.body.is_ball and is_diagonal(scene.body.inertia_tensor),
         ),
         Axis(
             "mass", "kg", masses, lambda nominal: nominal.scene.body.mass,
@@ -140,7 +132,8 @@ AXES = {
             between=partial(whole_power_between, 2.0), invariant=True,
         ),
         Axis(
-            "restitution", "1", lambda nominal: [0.0, 0.5, 0.9, 0.99, 0.999, 0.9999], _restitution,
+            "restitution", "1", lambda nominal: [0.0, 0.5, 0.9, 0.99, 0.999, 0.9999],
+            lambda nominal: nominal.scene.floor.restitution if nominal.scene.floor else math.nan,
             to.of_scene(lambda scene, restitution: changed(scene, floor={"restitution": restitution})),
             applies=lambda scene: scene.floor is not None and scene.floor.restitution < 1.0,
             between=restitution_between, coordinate=lambda restitution: -math.log(1.0 - restitution),

@@ -147,7 +147,8 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, refer
     if world.damping is not None:
         linear, angular = (column("damping", name, otherwise=rate) for name, rate in zip(MOTIONS, world.damping, strict=True))
         world = replace(world, damping=(linear, angular))
-    setup = Setup(
+    setup = replace(
+        Setup.of(scene),
         mass=np.array([body.mass for body in bodies]),
         inertia=np.array([body.inertia_tensor for body in bodies]),
         vertices=vertices,
@@ -157,8 +158,6 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, refer
         clearance=clearances(starts, vertices, semi_axes),
         gravity=np.zeros((1, 3)) if world.gravity is None else world.gravity,
         damping=None if world.damping is None else np.asarray(world.damping[0]),
-        factor_dt=scene.factor_dt,
-        floor=scene.floor is not None,
     )
     if scene.floor is not None:  # a start nearer to the limit is left to the scene's own check
         is_ordinary = is_ordinary & (setup.clearance >= -0.5 * TOUCHING * setup.size)

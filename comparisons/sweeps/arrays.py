@@ -7,6 +7,7 @@ by itself.
 
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -75,11 +76,9 @@ def _representative_scene(jobs: Jobs) -> Scenario | None:
     fields = jobs.fields.items()
     shared = [(name, column[0]) for name, column in fields if name == FRICTION or not _is_array_field(name, column)]
     for others in ((), fields):
-        try:
+        with suppress(SceneError):
             scene = with_fields(jobs.scene, [*shared, *((name, column[0]) for name, column in others)])
-        except SceneError:
-            continue
-        return None if scene.has_edges_or_walls else scene
+            return None if scene.has_edges_or_walls else scene
     return None
 
 

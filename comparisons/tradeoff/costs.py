@@ -44,11 +44,9 @@ LOAD = Path("/proc/loadavg")
 
 def load() -> float:
     """The number of threads of the machine that run or wait for a processor beside this one, per processor; NaN if not known."""
-    try:
-        running = LOAD.read_text().split()[3].partition("/")[0]
-    except OSError:  # of a system other than Linux
-        return math.nan
-    return (float(running) - 1.0) / (os.cpu_count() or 1)
+    with suppress(OSError):  # of a system other than Linux
+        return (float(LOAD.read_text().split()[3].partition("/")[0]) - 1.0) / (os.cpu_count() or 1)
+    return math.nan
 
 
 def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:

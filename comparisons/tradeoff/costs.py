@@ -7,7 +7,7 @@ import ctypes
 import math
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -55,7 +55,7 @@ def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
     In free flight every step takes the same time: so many are timed that the call is short beside them, beyond the end of the scene if the
     engine does not break down there. With a floor the time depends on the motion, so whole runs are timed.
     """
-    timed = partial(_finite, time_steps, entry.adapter, scene, dt)
+    timed = partial(_finite, entry.adapter, scene, dt)
     if scene.floor is None:
         with suppress(Diverged):
             return time_per_step(timings_in_flight(timed, FIRST_STEPS, TIMING_REPEATS, LONG_ENOUGH)) / dt
@@ -74,7 +74,7 @@ def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], w
     """
     times = []
     for dt in dts:
-        timed, steps = partial(_finite, time_steps, entry.adapter, [scene] * worlds, dt), scene.steps(dt)
+        timed, steps = partial(_finite, entry.adapter, [scene] * worlds, dt), scene.steps(dt)
         times.append(math.nan)
         with suppress(Diverged):
             timed(1)  # compiles
@@ -85,13 +85,13 @@ def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], w
     return [per_step / (dt * worlds) for dt, per_step in zip(dts, times, strict=True)]
 
 
-def _finite(time_them: Callable[..., TimedSteps], *args: Any) -> TimedSteps:
+def _finite(*args: Any) -> TimedSteps:
     """A timing of steps after which the states are finite.
 
     Raises:
         Diverged: They are not.
     """
-    timed = time_them(*args)
+    timed = time_steps(*args)
     if not np.isfinite(timed.state).all():
         raise Diverged("the state is not finite")
     return timed

@@ -65,19 +65,16 @@ def run_sweep(
     missing = (part for part in work.parts if part not in present)
     if scheduler is None:
         folder.begin(work.description)
-        _run_here(work, missing, folder, report)
+
+        def run_part(part: range, processes: EngineProcesses, raise_if_stopping: Callable[[], None]) -> None:
+            folder.write(part, work.table(part, processes, raise_if_stopping))
+
+        with started_crews(None, usable_cores(), [], work.resources) as crews:
+            work_in_parallel(missing, run_part, crews, lambda part, _: report(len(part)), lambda: report(0))
         return
     with connected(scheduler) as client:
         folder.begin(work.description)
         _run_on_cluster(client, work, missing, folder, report)
-
-
-def _run_here(work: Work, parts: Iterator[range], folder: SweepFolder, on_progress: Callable[[int], None]) -> None:
-    def run_part(part: range, processes: EngineProcesses, raise_if_stopping: Callable[[], None]) -> None:
-        folder.write(part, work.table(part, processes, raise_if_stopping))
-
-    with started_crews(None, usable_cores(), [], work.resources) as crews:
-        work_in_parallel(parts, run_part, crews, lambda part, _: on_progress(len(part)), lambda: on_progress(0))
 
 
 def _run_on_cluster(client: Any, work: Work, parts: Iterator[range], folder: SweepFolder, on_progress: Callable[[int], None]) -> None:

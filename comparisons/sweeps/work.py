@@ -137,7 +137,7 @@ def installed_versions() -> dict[str, str | None]:
 
 def _run_in_process(entry: EngineEntry, sweep: Sweep, first: int, last: int) -> Outcomes:
     """In the engine's process, where it is in place of its stand-in."""
-    engines = tuple(entry.engine if engine.label == entry.label and entry.engine is not None else engine for engine in sweep.engines)
+    engines = tuple(entry.adapter if engine.label == entry.label else engine for engine in sweep.engines)
     return run_jobs(replace(sweep, engines=engines), first, last)
 
 

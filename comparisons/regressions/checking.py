@@ -5,7 +5,7 @@ A check adds a row of kind `baseline` with a verdict for each accepted result, a
 
 import datetime
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -215,7 +215,7 @@ def _row(found: Mapping[Any, Any], verdict: Verdict, reason: str, **others: Any)
     return Measurement(**identity, dt=dt, kind="baseline", truth=truth, verdict=verdict, reason=reason)
 
 
-def _lost_rows(results: Results, gone: pd.DataFrame) -> list[Measurement]:
+def _lost_rows(results: Results, gone: pd.DataFrame) -> Iterator[Measurement]:
     """Rows for accepted results that the run lacks: one for each engine that did not run a scene, otherwise one for each result.
 
     An order or an asymptotic error that is now undefined does not fail, because the errors from which it is computed are checked
@@ -224,17 +224,15 @@ def _lost_rows(results: Results, gone: pd.DataFrame) -> list[Measurement]:
     remarks = results.table[results.table["metric"] == ""].assign(steps=step_names(results))
     remarks = remarks[~remarks["verdict"].isin(["limited", "no_truth"])]
     reasons = {(row.scene, row.engine, row.steps): f"{row.verdict}: {row.reason}" for row in remarks.itertuples()}
-    rows: list[Measurement] = []
     for where, lost in gone.groupby(["scene", "engine", "steps"], sort=False):
         records = lost.to_dict("records")
         if where in reasons:
-            rows.append(_row(records[0], "failed", f"{len(lost)} accepted results are gone, {reasons[where]}", metric="", unit=""))
+            yield _row(records[0], "failed", f"{len(lost)} accepted results are gone, {reasons[where]}", metric="", unit="")
             continue
         for row in records:
             verdict: Verdict = "failed" if row["change"] == "gone" else "measured"
             now = f"not measured now{row['note']}" if row["change"] == "gone" else "undefined now"
-            rows.append(_row(row, verdict, f"accepted {row['before']:.6g}, {now}"))
-    return rows
+            yield _row(row, verdict, f"accepted {row['before']:.6g}, {now}")
 
 
 def _with_known_failures(results: Results, found: pd.DataFrame) -> pd.DataFrame:

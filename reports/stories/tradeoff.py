@@ -11,7 +11,7 @@ from dropspin.comparisons.tradeoff.errors import Ladder
 from dropspin.comparisons.tradeoff.points import LEVEL, CostPoint, TradeOff, spread
 from dropspin.reports.document import Charts, Document, Heading, Part, Rows, Sentences, Table
 from dropspin.reports.plots.figures import tradeoff_charts
-from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, left_out
+from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, left_out, with_unit
 from dropspin.reports.stories.study import Records, Study
 from dropspin.scenarios.text import counted, rounded
 
@@ -134,13 +134,13 @@ def _undefined(study: TradeOff) -> list[str]:
 
 def _recommendation(study: TradeOff, tolerance: float) -> str:
     """A sentence with the cheapest configuration within a tolerance, the next best, and the best one in a batch."""
-    unit = "" if (of := METRICS[study.metric].unit) == "1" else f" {of}"
-    goal = f"{study.scene.name}, {study.metric.replace('_', ' ')} within {tolerance:g}{unit}"
+    unit = METRICS[study.metric].unit
+    goal = f"{study.scene.name}, {study.metric.replace('_', ' ')} within {with_unit(f'{tolerance:g}', unit)}"
     advice = study.recommendation(tolerance)
     if advice is None:
         nearest = min(study.points, key=lambda point: point.error)
         ladder = next(ladder for ladder in study.ladders if ladder.engine == nearest.engine)
-        error = f"{formatted(nearest.error)}{unit}"
+        error = with_unit(formatted(nearest.error), unit)
         if nearest.error <= tolerance:
             none = "no tested configuration is within this tolerance at its time step and at all smaller ones"
             larger = "a larger one" if any(value > tolerance for dt, value in ladder.completed if dt < nearest.dt) else "none"

@@ -48,11 +48,8 @@ def _open_at_once(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NONBLOCK, 0o666)
 
 
-class _Positive(click.FloatRange):
-    """A finite number above 0: click's own range accepts nan, and inf."""
-
-    def __init__(self, least: float = 0.0, most: float | None = None) -> None:
-        super().__init__(min=least, min_open=least == 0.0, max=most)
+class _Finite(click.FloatRange):
+    """A number in a range that is finite: click's own range accepts nan, and inf."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         number = super().convert(value, param, ctx)
@@ -61,7 +58,7 @@ class _Positive(click.FloatRange):
         return number
 
 
-POSITIVE = _Positive()
+POSITIVE = _Finite(0.0, min_open=True)
 ONE_MINUTE, FIVE_MINUTES = 60.0, 300.0
 """Processor times of the `ResourceLimits` of these names [s], whose module takes longer to import than a command to print its help."""
 within_option = click.option(
@@ -86,7 +83,7 @@ class WholeNumbers(click.ParamType):  # type: ignore[type-arg]  # not generic at
 
 def seconds_option(*names: str, default: float, of: str, least: float = 0.0, callback: Any = None) -> Callable[[Command], Command]:
     """An option whose value is a processor time."""
-    kind, text = _Positive(least, most=1e7), f"Processor time {of}"
+    kind, text = _Finite(least, 1e7, min_open=least == 0.0), f"Processor time {of}"
     return click.option(*names, type=kind, default=default, metavar="SECONDS", help=text, callback=callback)
 
 

@@ -4,11 +4,19 @@ from typing import Any
 
 import click
 
-from dropspin.reports.commands.options import POSITIVE, as_json, engines_option, jobs_option, output_option, time_limit_option
+from dropspin.reports.commands.options import (
+    POSITIVE,
+    as_json,
+    engines_option,
+    jobs_option,
+    output_option,
+    scenes_argument,
+    time_limit_option,
+)
 
 
 @click.command("limits")
-@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@scenes_argument
 @engines_option()
 @click.option(
     "--axis",

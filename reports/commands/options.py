@@ -16,6 +16,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 as_json = click.option("--json", "json_output", is_flag=True, help="Print JSON instead of a table.")
 BASELINE = "dropspin-baseline.toml"
 """The baseline that `accept` writes and `check` reads unless another one is named."""
+scenes_argument = click.argument("scenes", nargs=-1, metavar="[SCENE]...")
 baseline_option = click.option("--baseline", metavar="FILE", help="Baseline to compare the run with: the file that dropspin accept wrote.")
 summary_option = click.option("--summary", metavar="FILE", help="Append a Markdown summary to this file, such as $GITHUB_STEP_SUMMARY.")
 

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
-from dropspin.reports.commands.options import POSITIVE
+from dropspin.reports.commands.options import POSITIVE, scenes_argument
 from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo
 
 
 @click.command("replay")
 @click.argument("run", metavar="RUN")
-@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@scenes_argument
 @click.option("--dt", type=POSITIVE, metavar="SECONDS", help="One of the run's time steps. [default: the coarsest]")
 @click.option("-o", "--output", metavar="FILE", help="The page to write. [default: replay.html in the run's folder]")
 @click.option("--gif", metavar="FILE", help="Write an animated GIF of one scene instead.")

@@ -14,6 +14,7 @@ from dropspin.reports.commands.options import (
     engines_option,
     jobs_option,
     output_option,
+    scenes_argument,
     time_limit_option,
     within_option,
 )
@@ -31,7 +32,7 @@ CORE_ENGINES = ("wang", "mujoco", "pybullet")
 
 
 @click.command("run")
-@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@scenes_argument
 @engines_option()
 @click.option(
     "--dt", "dts", multiple=True, type=float, metavar="SECONDS", help="A time step; repeat for more. [default: 0.004, 0.002, 0.001]"

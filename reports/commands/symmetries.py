@@ -5,11 +5,19 @@ from typing import Any
 
 import click
 
-from dropspin.reports.commands.options import as_json, engines_option, jobs_option, output_option, step_option, time_limit_option
+from dropspin.reports.commands.options import (
+    as_json,
+    engines_option,
+    jobs_option,
+    output_option,
+    scenes_argument,
+    step_option,
+    time_limit_option,
+)
 
 
 @click.command("symmetries")
-@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@scenes_argument
 @engines_option()
 @step_option("")
 @time_limit_option("an engine may use for one scene")

@@ -4,11 +4,20 @@ from typing import Any
 
 import click
 
-from dropspin.reports.commands.options import POSITIVE, WholeNumbers, as_json, engines_option, jobs_option, output_option, seconds_option
+from dropspin.reports.commands.options import (
+    POSITIVE,
+    WholeNumbers,
+    as_json,
+    engines_option,
+    jobs_option,
+    output_option,
+    scenes_argument,
+    seconds_option,
+)
 
 
 @click.command("tradeoff")
-@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@scenes_argument
 @engines_option()
 @click.option("--metric", metavar="METRIC", help="The metric of the error. [default: the scene's leading metric]")
 @click.option(

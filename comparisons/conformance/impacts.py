@@ -180,13 +180,11 @@ def _impulses(contact: Contact, response: Array) -> Iterator[tuple[str, Array]]:
     rebound, speed = -e * u_n, -u_n
     limit = friction * (1.0 + e) * speed / slip if slip > 0.0 and friction > 0.0 else 0.0
     share = min(limit, 1.0)
-    yield BY_SLIP, by_slip(rebound, share)
-    if np.isfinite(friction):
-        yield BY_SLIP, by_force(rebound, 1.0)
-    for message, wrong in ((IN_NORMAL, e * speed**2), (IN_NORMAL, (1.0 + e) * speed**2 - speed), (INTO_FLOOR, -e * speed)):
-        yield message, by_slip(wrong, share)
+    upward = ((BY_SLIP, rebound), (IN_NORMAL, e * speed**2), (IN_NORMAL, (1.0 + e) * speed**2 - speed), (INTO_FLOOR, -rebound))
+    for message, velocity in upward:
+        yield message, by_slip(velocity, share)
         if np.isfinite(friction):
-            yield message, by_force(wrong, 1.0)
+            yield message, by_force(velocity, 1.0)
     if limit == 0.0:
         return
     yield REVERSED, by_slip(rebound, 2.0 - share)

@@ -210,9 +210,7 @@ def turning_impulse(scene: Scenario, states: Array) -> str:
 
 def check_later_impacts(engine: Engine) -> str:
     """Restitution is the same at each contact of a body that bounces."""
-    decay = decaying_restitution(engine)
-    if decay is not None:
-        raise CheckFailed(decay)
+    verify_no_decay(engine)
     pairs, scene = restitutions(engine), accepted_scene(engine, "bouncing ball", "bouncing box")
     if turning := turning_impulse(scene, recorded(engine, scene)[[0, -1]]):
         raise CheckFailed(turning)
@@ -221,17 +219,18 @@ def check_later_impacts(engine: Engine) -> str:
     return f"restitution in successive impacts: {', '.join(f'{e:.3g}' for e, _ in pairs)}"
 
 
-def decaying_restitution(engine: Engine) -> str | None:
-    """A message if restitution falls from impact to impact, whatever the speed of the fall; None if it does not."""
+def verify_no_decay(engine: Engine) -> None:
+    """Raise `CheckFailed` if restitution falls from impact to impact, whatever the speed of the fall."""
     pairs = restitutions(engine)
     if len(pairs) < FEWEST or any(later[0] > (1.0 - FALL) * earlier[0] for earlier, later in pairwise(pairs)):
-        return None
+        return
     close = SAME * (pairs[0][0] - pairs[1][0])
     for speed in (pairs[1][1], 1.2 * pairs[0][1]):
         others = restitutions(engine, speed)
         if not others or any(abs(first[0] - second[0]) > close for first, second in zip(pairs[:2], others, strict=False)):
-            return None
-    return f"{LATER}: {', '.join(rounded(e, 2) for e, _ in pairs)} in successive impacts; a scene has one restitution for all of them"
+            return
+    successive = ", ".join(rounded(e, 2) for e, _ in pairs)
+    raise CheckFailed(f"{LATER}: {successive} in successive impacts; a scene has one restitution for all of them")
 
 
 def restitutions(engine: Engine, speed: float | None = None) -> list[tuple[float, float]]:

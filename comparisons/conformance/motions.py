@@ -16,8 +16,8 @@ from dropspin.comparisons.conformance.impacts import (
     OF_NOTE,
     OF_REBOUND,
     PECULIARITIES,
-    decaying_restitution,
     explain_impact,
+    verify_no_decay,
 )
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
 from dropspin.comparisons.conformance.probes import DT, PROBES, Probe, differences
@@ -56,25 +56,23 @@ def check_motion(engine: Engine, probe: Probe) -> str:
     law = _own_law(engine, probe, states)
     if law is not None:
         raise Noted(f"impacts follow the {law} law, as the engine states")
-    mistake = _in_impacts(engine, probe, recording.motion)
-    if mistake is not None:
-        raise mistake
+    _verify_impacts(engine, probe, recording.motion)
     fault = explain_motion(probe, states, lambda other: _states(engine, other))
     if fault is None:
         raise CheckFailed("; ".join(symptoms(probe, recording.motion)))
     raise Noted(fault.message) if fault.is_peculiarity else CheckFailed(fault.message)
 
 
-def _in_impacts(engine: Engine, probe: Probe, motion: Trajectory) -> CheckFailed | Noted | None:
-    """A mistake in an impact, or that restitution decays, by which another fault could seem to explain the motion."""
+def _verify_impacts(engine: Engine, probe: Probe, motion: Trajectory) -> None:
+    """Raise an exception for a mistake in an impact, or if restitution decays, by which another fault could seem to explain the motion."""
     mistake = explain_impact(probe.scene, motion)
     if mistake in OF_REBOUND and _rebounds_rightly(engine, probe):
         mistake = None
     is_stated = mistake == OF_NOTE and "law note" in (engine.discretisation(probe.scene) or "")  # the motion then differs otherwise
     if mistake is not None and not is_stated:
-        return Noted(mistake) if mistake in PECULIARITIES else CheckFailed(mistake)
-    decay = decaying_restitution(engine) if probe.scene.floor is not None and probe.scene.floor.friction == "none" else None
-    return None if decay is None else CheckFailed(decay)
+        raise Noted(mistake) if mistake in PECULIARITIES else CheckFailed(mistake)
+    if probe.scene.floor is not None and probe.scene.floor.friction == "none":
+        verify_no_decay(engine)
 
 
 def _rebounds_rightly(engine: Engine, probe: Probe) -> bool:

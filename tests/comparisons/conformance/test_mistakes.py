@@ -116,7 +116,7 @@ def test_mistake_is_named(title):
 def test_mistake_of_restitution_that_another_probe_excludes_is_not_named(monkeypatch):
     """Restitution by the square of the speed, in slow impacts alone and in all; without the searches for other faults."""
     monkeypatch.setattr(motions, "explain_motion", lambda *asked: None)
-    monkeypatch.setattr(motions, "decaying_restitution", lambda engine_: None)
+    monkeypatch.setattr(motions, "verify_no_decay", lambda engine_: None)
     monkeypatch.setattr(motions, "PROBES", [probe for probe in PROBES if probe.name in ("slow ball", "bouncing ball")])
 
     def squared(self, u):

@@ -78,10 +78,9 @@ def _verify_impacts(engine: Engine, probe: Probe, motion: Trajectory) -> None:
 def _rebounds_rightly(engine: Engine, probe: Probe) -> bool:
     """Whether the engine is right in another probe of the same body and friction, which a mistake of the rebound changes too."""
     for other in PROBES:
-        (own, floor), is_same_body = (probe.scene.floor, other.scene.floor), other.scene.body == probe.scene.body
-        is_alike = other != probe and is_same_body and own is not None and floor is not None and own.friction == floor.friction
-        states = _states(engine, other) if is_alike else None
-        if states is not None and other.off(states, other.exact) <= 1.0:
+        own, floor = probe.scene.floor, other.scene.floor
+        is_alike = other != probe and other.scene.body == probe.scene.body and own and floor and own.friction == floor.friction
+        if is_alike and (states := _states(engine, other)) is not None and other.off(states, other.exact) <= 1.0:
             return True
     return False
 

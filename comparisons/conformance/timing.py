@@ -208,19 +208,14 @@ def check_waiting(engine: Engine) -> str:
             f"advance({steps}) returned after {returned}, and state() then took {took}: the steps were not done; wait for them in advance "
             "(JAX: block_until_ready; Warp: synchronize)"
         )
-    _verify_steps(engine, scene, steps)
-    return f"advance({steps}) returns when its steps are done"
-
-
-def _verify_steps(engine: Engine, scene: Scenario, steps: int) -> None:
-    """A long call ends where short calls end; a state that is read too early, or after fewer steps, is another."""
     short_calls = [PIECE] * (steps // PIECE)
     difference = relative_difference(state_after(engine, scene, [steps]), state_after(engine, scene, short_calls))
-    if not difference <= FAR:
+    if not difference <= FAR:  # a state that is read too early, or after fewer steps, is another
         raise CheckFailed(
             f"the state after advance({steps}) is not that after {len(short_calls)} calls of advance({PIECE}), by {difference:.2g} of the "
             "largest number: the long call takes fewer steps, or state() does not wait for them"
         )
+    return f"advance({steps}) returns when its steps are done"
 
 
 def _timed(simulation: Simulation, steps: int) -> tuple[float, float]:

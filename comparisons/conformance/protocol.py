@@ -244,7 +244,7 @@ def same(first: Array, second: Array) -> bool:
 
 def check_files(engine: Engine) -> str:
     """No file is written to the working directory, also when a simulation breaks down."""
-    scene = accepted_scene(engine, "tumbling", "turning", "falling straight", "coasting")
+    scene = accepted_scene(engine, *FLIGHTS)
     wild = scene.starting_at(scene.initial_state * np.repeat([1.0, 1e4], [7, 6]))
     breakdown = ""
     with tempfile.TemporaryDirectory() as folder, chdir(folder):

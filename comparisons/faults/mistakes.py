@@ -25,20 +25,12 @@ ACCURACY = 1e-9
 FARTHEST = 100.0  # rad
 
 
-def _no_torque(q: Array, w: Array, inertia: Array) -> Array:
-    return np.zeros(3)
-
-
 def _gyroscopic(q: Array, w: Array, inertia: Array) -> Array:
     return rotate(q, _not_rotated(q, unrotate(q, w), inertia))
 
 
 def _not_rotated(q: Array, w: Array, inertia: Array) -> Array:
     return np.asarray(np.linalg.solve(inertia, cross(inertia @ w, w)))
-
-
-def _rotated_back(q: Array, w: Array, inertia: Array) -> Array:
-    return unrotate(q, _not_rotated(q, rotate(q, w), inertia))
 
 
 def _not_inverted(q: Array, w: Array, inertia: Array) -> Array:
@@ -105,7 +97,7 @@ def _integrated(mistake: Mistake, scene: Scenario, times: tuple[float, ...]) -> 
 MISTAKES = (
     *(
         mistake
-        for torque in (_no_torque, _gyroscopic)
+        for torque in (lambda *_: np.zeros(3), _gyroscopic)
         for mistake in (
             Mistake(ORDER, torque, swapped=True),
             Mistake(f"{SQUARE}: a step turns the body by |ω| dt about ω", torque, turning=None),
@@ -117,7 +109,7 @@ MISTAKES = (
         )
     ),
     Mistake(NOT_ROTATED, _not_rotated),
-    Mistake(ROTATED_BACK, _rotated_back),
+    Mistake(ROTATED_BACK, lambda q, w, inertia: unrotate(q, _not_rotated(q, rotate(q, w), inertia))),
     Mistake(NOT_INVERTED, _not_inverted),
     Mistake("the gyroscopic term has the opposite sign: ω' = I⁻¹ (I ω × ω) without torque", lambda *args: -_gyroscopic(*args)),
 )

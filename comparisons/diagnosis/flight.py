@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -128,10 +129,9 @@ def _stated(body: LooseBody, dt: float) -> tuple[Array, Array, float]:
 
 def _gain(body: LooseBody, start: Array, dt: float) -> float:
     """The change of energy in a second [%]; inf if the simulation breaks down."""
-    try:
+    with suppress(Diverged):
         return float(_energy_gain(body, start, _turned(body, start, dt)))
-    except Diverged:
-        return math.inf
+    return math.inf
 
 
 def _energy_gain(body: LooseBody, first: Array, last: Array) -> Array:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import cache, cached_property
 from typing import Any
 
@@ -72,8 +73,6 @@ class Recompiled:
 
 def _compiled(spec: Any) -> tuple[Any, Any] | None:
     """The model of a specification, with its data; None if MuJoCo refuses it."""
-    try:
-        with quiet():
-            return placed(spec.compile())
-    except ValueError:
-        return None
+    with suppress(ValueError), quiet():
+        return placed(spec.compile())
+    return None

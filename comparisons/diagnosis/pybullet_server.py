@@ -6,7 +6,7 @@ import re
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -60,11 +60,8 @@ def load(given: str, file: str, flags: int = 0, *, remedy: str = "") -> int:
         else:
             path = Path(file)
         said = Path(folder, "said")
-        with said.open("wb") as there, _printing_to(there.fileno()):
-            try:
-                return int(bullet.loadURDF(str(path), flags=flags))
-            except bullet.module.error:
-                pass
+        with said.open("wb") as there, _printing_to(there.fileno()), suppress(bullet.module.error):
+            return int(bullet.loadURDF(str(path), flags=flags))
         text = said.read_text(encoding="utf-8", errors="replace")
     said_of = re.findall(r"b3(Error|Warning|Printf)\[[^]]*\]:(.*?)(?=b3(?:Error|Warning|Printf)\[|$)", text, re.DOTALL)
     pieces = [" ".join(piece.split()) for kind, piece in said_of if kind == "Error" or "cannot find" in piece]

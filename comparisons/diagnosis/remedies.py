@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
@@ -95,12 +96,11 @@ def answers_to(question: Question, body: LooseBody, targets: Targets = NO_TARGET
     @cache
     def again(settings: tuple[str, ...] | frozenset[str], step: float) -> list[Answer]:
         """The answers with the remedies of settings, or with a set of them reverted alone, at a time step [s]; none of a breakdown."""
-        try:
+        with suppress(Diverged):
             if isinstance(settings, tuple):
                 return question(body.tried(settings), [step])
             return question(body.changed({name: body.remedies[name][name] for name in settings}), [step])
-        except Diverged:
-            return []
+        return []
 
     for number, answer in enumerate(answers):
 

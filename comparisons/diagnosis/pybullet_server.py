@@ -54,11 +54,9 @@ def load(given: str, file: str, flags: int = 0, *, remedy: str = "") -> int:
     """
     bullet = server()
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "model.urdf")
+        path = Path(folder, "model.urdf") if file.startswith("<") else Path(file)
         if file.startswith("<"):
             path.write_text(file, encoding="utf-8")
-        else:
-            path = Path(file)
         said = Path(folder, "said")
         with said.open("wb") as there, _printing_to(there.fileno()), suppress(bullet.module.error):
             return int(bullet.loadURDF(str(path), flags=flags))

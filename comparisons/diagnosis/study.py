@@ -205,9 +205,8 @@ def _refusals(given: str, read: Sequence[tuple[EngineEntry, list[str] | Dropspin
     broken = [(entry.label, unread(given, entry.label, why.reason), False) for entry, why in read if isinstance(why, Breakdown)]
     names = dict.fromkeys(name for _, found in read if isinstance(found, list) for name in found)
     if not names:
-        raise DropspinError(" ".join(why for _, why, _ in [*refused[:1], *broken]))
-    failed = [*refused, *broken]
-    return [BodyDiagnosis(name, label, breakdown=why, declined=declined) for label, why, declined in failed for name in names]
+        raise DropspinError(" ".join(why for _, why, _ in refused[:1] + broken))
+    return [BodyDiagnosis(name, label, breakdown=why, declined=declined) for label, why, declined in refused + broken for name in names]
 
 
 @lru_cache(maxsize=1)

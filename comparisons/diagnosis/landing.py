@@ -173,19 +173,15 @@ def _of_error(body: LooseBody, error: float, finest: float, noteworthy: float) -
 def _at_rest(body: LooseBody, dt: float) -> tuple[float, float, bool]:
     """The mean depth [m] and the speed [m/s] of a body that was put down, in the last half second, and whether it tips or rolls."""
     states = body.settled if dt == body.facts.dt else body.put_down(dt)
-    last = _last_half_second(states, dt)
+    last = states[-math.ceil(0.5 / dt) :]
     speed = float(np.linalg.norm(np.ptp(last[:, POSITION], axis=0))) / 0.5
     return -float(body.facts.lowest(last).mean()), speed, tilt(states) > UNTURNED
 
 
 def is_at_rest(body: LooseBody) -> bool:
     """Whether a body that was put down neither rises nor falls in the last half second, to 1 % of its size."""
-    last = _last_half_second(body.settled, body.facts.dt)
+    last = body.settled[-math.ceil(0.5 / body.facts.dt) :]
     return bool(np.ptp(last[:, POSITION][:, 1]) <= _noteworthy(body.facts))
-
-
-def _last_half_second(states: Array, dt: float) -> Array:
-    return states[-math.ceil(0.5 / dt) :]
 
 
 def _noteworthy(facts: Facts) -> float:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dropspin.comparisons.diagnosis.parts import AXES, DIRECTIONS, VOLUMES, Part, Support
-from dropspin.comparisons.diagnosis.source import Setting
+from dropspin.comparisons.diagnosis.source import Ignored, Setting
 from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import SPIN, UP, Array
@@ -105,7 +105,7 @@ class Facts:
     rest_depth: float
     written: MassProperties | None
     settings: Mapping[str, Setting]
-    ignored: Sequence[tuple[str, Setting, str]]
+    ignored: Sequence[Ignored]
     unmodelled: Sequence[str]
     missed: str = ""
     left_out: str = ""

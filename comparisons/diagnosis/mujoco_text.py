@@ -13,10 +13,10 @@ from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, digits
 from dropspin.comparisons.diagnosis.loose_body import MassProperties
 from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
 from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
-from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, owner_of, pair_element
+from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, pair_element
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL
-from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
+from dropspin.comparisons.diagnosis.source import Element, Ignored, Setting, mjcf_setting, option_setting, tagged
 from dropspin.comparisons.diagnosis.urdf_file import used_by_neither_engine
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
@@ -46,6 +46,7 @@ class BodyText:
 
     def __init__(self, file: MuJoCoFile, head: int, surface: int | None, contacts: Mapping[int, Mapping[str, Any]]) -> None:
         self._file, self._head, self._surface, self._contacts = file, head, surface, contacts
+        self._model, self._group = file.model, file.group(head)
 
     @cached_property
     def element(self) -> Element | None:
@@ -55,8 +56,7 @@ class BodyText:
     @cached_property
     def _bodies(self) -> list[Element]:
         """The body and what is welded to it, in the file."""
-        found = [body_element(self._file, body) for body in self._file.group(self._head)]
-        return [element for element in found if element is not None]
+        return list(filter(None, (body_element(self._file, body) for body in self._group)))
 
     @cached_property
     def written(self) -> MassProperties | None:
@@ -75,13 +75,13 @@ class BodyText:
 
     def _properties(self, compiled: tuple[Any, Any] | None) -> MassProperties | None:
         """Those of the body and of what is welded to it in a compiled model with its data; None without mass or without a model."""
-        return None if compiled is None else mass_properties(*compiled, self._file.group(self._head))
+        return None if compiled is None else mass_properties(*compiled, self._group)
 
     @cached_property
     def _tensor(self) -> Array | None:
         """The tensor that is written for a body to which nothing is welded, about the axes of its inertial frame."""
         inertial = None if self.element is None else next(iter(children_of(self.element, "inertial")), None)
-        if inertial is None or len(self._file.group(self._head)) > 1:
+        if inertial is None or len(self._group) > 1:
             return None
         values = inertial.attributes
         if self._file.is_urdf:
@@ -98,7 +98,7 @@ class BodyText:
         options = {"timestep": "0.002", "integrator": "Euler", "cone": "pyramidal", "impratio": "1", "density": "0", "viscosity": "0"}
         found = {name: option_setting(root, "option", name, default) for name, default in options.items()}
         found["sleep_tolerance"] = option_setting(root, "flag", "sleep", "disable")
-        of_all = {name: option_setting(root, "option", f"o_{name}", "") for name in overrides(self._file.model)}
+        of_all = {name: option_setting(root, "option", f"o_{name}", "") for name in overrides(self._model)}
         if body is None:
             return found
         places: dict[str, list[Element]] = {"gravcomp": self._bodies} | dict.fromkeys(OF_JOINT, self._joint)
@@ -122,17 +122,14 @@ class BodyText:
     @cached_property
     def _of_contact(self) -> list[Element]:
         """What sets the contact: the pairs, the geometries that touch, or all if none does, and the one that the body lands on."""
-        group = self._file.group(self._head)
-        touching = list(self._contacts) or [geom for geom, body in enumerate(self._file.model.geom_bodyid) if body in group]
+        touching = list(self._contacts) or [geom for geom, body in enumerate(self._model.geom_bodyid) if body in self._group]
         geoms = touching if self._surface is None else [*touching, self._surface]
-        found = [*self._pairs, *(geom_element(self._file, geom) for geom in geoms)]
-        return [element for element in found if element is not None]
+        return [*self._pairs, *filter(None, (geom_element(self._file, geom) for geom in geoms))]
 
     @cached_property
     def _pairs(self) -> list[Element]:
         """The pairs of the file whose settings are those of the contact."""
-        found = [pair_element(self._file, geom, self._surface) for geom in self._contacts if self._surface is not None]
-        return [pair for pair in found if pair is not None]
+        return list(filter(None, (pair_element(self._file, geom, self._surface) for geom in self._contacts if self._surface is not None)))
 
     def patch(self, options: Mapping[str, object], others: Mapping[str, object]) -> str:
         """Elements to write for changes of options, and of the joint, the geometries and the body: changed ones with their lines.
@@ -168,20 +165,19 @@ class BodyText:
 
     def _contact_of_geoms(self, changes: Mapping[str, object]) -> list[Setting]:
         """The geometries with other settings of the contact: margins add, and of the others those of the larger priority count alone."""
-        model = self._file.model
         if "margin" in changes:
             return [geom.changed({"margin": 0}) for geom in self._of_contact if mjcf_setting(geom, "margin") is not None]
         found = []
         for number, contact in self._contacts.items():
             kept = {"friction": contact["friction"][OF_GEOM], "condim": np.array([contact["condim"]])}
-            kept = {name: value for name, value in kept.items() if np.any(value != getattr(model, f"geom_{name}")[number])}
+            kept = {name: value for name, value in kept.items() if np.any(value != getattr(self._model, f"geom_{name}")[number])}
             texts = {name: " ".join(f"{one:g}" for one in value) for name, value in kept.items()}
-            priority = 1 + model.geom_priority[[number, self._surface]].max()
+            priority = 1 + self._model.geom_priority[[number, self._surface]].max()
             element = geom_element(self._file, number)
             found += [] if element is None else [element.changed({**changes, "priority": priority, **texts})]
         return found
 
-    def ignored(self, in_force: MassProperties, *, raised: bool, condim: int) -> Iterator[tuple[str, Setting, str]]:
+    def ignored(self, in_force: MassProperties, *, raised: bool, condim: int) -> Iterator[Ignored]:
         """What the file says and MuJoCo changes or does not use.
 
         Args:
@@ -195,7 +191,7 @@ class BodyText:
                 setting = option_setting(self._file.source, "option", "gravity", "")
                 yield "gravity", setting, f"taken as {gravity:g} m/s²; dropspin reads SI units, and this may be a model in {unit}"
         if raised:
-            constant = 2.0 * self._file.model.opt.timestep
+            constant = 2.0 * self._model.opt.timestep
             yield "solref", settings.get("solref", Setting("solref")), f"raised to a time constant of {constant:g} s, two time steps"
         if written is not None:
             wanted, has = np.linalg.eigvalsh(written.inertia), np.linalg.eigvalsh(in_force.inertia)
@@ -215,7 +211,7 @@ class BodyText:
         if self._file.is_urdf:
             element = self.element
             yield from self._without_inertial()
-            if self._file.model.body_weldid[self._head] == 0:
+            if self._model.body_weldid[self._head] == 0:
                 yield "base", Setting("the root link") if element is None else element.words, "welded to the world"
             yield from self._unread()
 
@@ -226,15 +222,14 @@ class BodyText:
         place += len(numbers) == 5  # the coefficients of a pair, two of them sliding
         return float(numbers[place]) if len(numbers) > place else 0.0
 
-    def _miscounted(self) -> Iterator[tuple[str, Setting, str]]:
+    def _miscounted(self) -> Iterator[Ignored]:
         """A mass that is not that of the volumes of the body's meshes."""
         has, exact = self._properties(self._file.compiled), self._properties(self._file.recompiled.exact)
         if has is not None and exact is not None and abs(has.mass - exact.mass) > NOTEWORTHY * exact.mass:
-            model, group = self._file.model, self._file.group(self._head)
             used = {
-                mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MESH, model.geom_dataid[geom])
-                for geom in np.flatnonzero(np.isin(model.geom_bodyid, group))
-                if model.geom_dataid[geom] >= 0
+                mujoco.mj_id2name(self._model, mujoco.mjtObj.mjOBJ_MESH, self._model.geom_dataid[geom])
+                for geom in np.flatnonzero(np.isin(self._model.geom_bodyid, self._group))
+                if self._model.geom_dataid[geom] >= 0
             }
             every = list(self._file.source.every("mesh"))
             meshes = [mesh for mesh in every if mesh.attributes.get("name", Path(mesh.attributes.get("file", "")).stem) in used]
@@ -245,10 +240,10 @@ class BodyText:
     def _links(self) -> dict[int, Element]:
         """The links of a URDF file of the body and what is welded to it, by the numbers of the bodies."""
         links = {link.attributes.get("name", ""): link for link in self._file.source.every("link")}
-        names = {number: mujoco.mj_id2name(self._file.model, BODY, number) for number in self._file.group(self._head)}
+        names = {number: mujoco.mj_id2name(self._model, BODY, number) for number in self._group}
         return {number: links[name] for number, name in names.items() if name in links}
 
-    def _unread(self) -> Iterator[tuple[str, Setting, str]]:
+    def _unread(self) -> Iterator[Ignored]:
         """The settings of contacts in a URDF file."""
         for number, link in self._links.items():
             of_link = "" if number == self._head else f" of {link.attributes['name']}"
@@ -256,27 +251,27 @@ class BodyText:
             for found in (*unread, *used_by_neither_engine(link)):
                 yield f"{found.tag}{of_link}", found.words, "not read"
 
-    def _without_inertial(self) -> Iterator[tuple[str, Setting, str]]:
+    def _without_inertial(self) -> Iterator[Ignored]:
         """The links of a URDF file, of the body and what is welded to it, of which the mass follows from the geometries."""
         for number, link in self._links.items():
-            mass = self._file.model.body_mass[number]
+            mass = self._model.body_mass[number]
             if mass > 0.0 and next(link.every("inertial"), None) is None:
                 words = Setting(f"no inertial in link {link.attributes['name']}", link.file, link.line)
                 yield "inertial", words, f"missing: the mass is {mass:.4g} kg, that of the geometries at the default density"
 
-    def _visual(self) -> Iterator[tuple[str, Setting, str]]:
+    def _visual(self) -> Iterator[Ignored]:
         """Geometries that collide with nothing, and count in the mass by their density."""
         has, least = self._properties(self._file.compiled), self._properties(self._file.recompiled.without_visual)
         if self.element is None or has is None or least is None or not has.mass - least.mass > NOTEWORTHY * has.mass:
             return
-        model, elements = self._file.model, [geom for geom in self.element.every("geom") if owner_of(geom) is self.element]
+        model, elements = self._model, children_of(self.element, "geom")
         geoms = np.flatnonzero(model.geom_bodyid == self._head)
         pairs = zip(geoms, elements, strict=True) if len(geoms) == len(elements) else ()
         visual = [element for geom, element in pairs if not (model.geom_contype[geom] or model.geom_conaffinity[geom])]
         words = visual[0].words if visual else Setting("geometries that collide with nothing")
         yield "visual", words, f"counted in the mass with {has.mass - least.mass:.4g} kg, by density, although it collides with nothing"
 
-    def _changed(self, name: str, made: str) -> tuple[str, Setting, str]:
+    def _changed(self, name: str, made: str) -> Ignored:
         """A quantity that the compiler changes, with what is written, and the settings of which each alone makes a difference."""
         found = {setting: option_setting(self._file.source, "compiler", setting, "") for setting in (*NEUTRAL, "balanceinertia")}
         why = [words for setting, words in found.items() if words.file and self._acts(setting, name)]

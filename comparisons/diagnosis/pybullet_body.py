@@ -16,9 +16,9 @@ import pybullet_data  # type: ignore[import-untyped]
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
 from dropspin.comparisons.diagnosis.parts import Part, Support, at_point
-from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Ignored, Link, read_links
+from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Link, read_links
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
-from dropspin.comparisons.diagnosis.source import Setting
+from dropspin.comparisons.diagnosis.source import Ignored, Setting
 from dropspin.comparisons.diagnosis.urdf_file import UrdfFile, package_remedy
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.packages import version

@@ -10,7 +10,7 @@ import numpy as np
 from dropspin.comparisons.diagnosis.answers import digits
 from dropspin.comparisons.diagnosis.parts import Part, mesh_shape, solid
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
-from dropspin.comparisons.diagnosis.source import Element, Setting
+from dropspin.comparisons.diagnosis.source import Element, Ignored, Setting
 from dropspin.comparisons.diagnosis.urdf_file import UrdfFile, used_by_neither_engine
 from dropspin.comparisons.engines.pybullet_simulation import Z_TO_Y
 from dropspin.scenarios import DropspinError
@@ -26,7 +26,6 @@ SAME = 0.01
 """Relative difference up to which a moment of inertia is the one that was written."""
 OF_CONTACT = ("friction", "lateral_friction", "restitution", "rolling_friction", "spinning_friction")
 """Elements that PyBullet reads within <contact> alone."""
-Ignored = tuple[str, Setting, str]
 
 
 class Link(NamedTuple):

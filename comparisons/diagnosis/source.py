@@ -33,6 +33,10 @@ class Setting(NamedTuple):
         return f"{self.text} ({self.file}, line {self.line})" if self.file else f"{self.text} (the engine's default)"
 
 
+Ignored = tuple[str, Setting, str]
+"""What an engine read and does not use, or changes: name, what is written, what is in force."""
+
+
 @dataclass(eq=False)
 class Element:
     """An element of XML and where it is written."""

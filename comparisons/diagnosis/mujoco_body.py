@@ -16,7 +16,7 @@ from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of
 from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ENUMERATIONS, GEOM, OPTIONS, PLANE, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
-from dropspin.comparisons.diagnosis.parts import Part, Support, at_point
+from dropspin.comparisons.diagnosis.parts import Part, at_point, lowest_of
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.mujoco_model import contact
 from dropspin.comparisons.engines.mujoco_settings import CONTACT
@@ -218,11 +218,10 @@ class MuJoCoBody(LooseBody):
     @property
     def _lowest(self) -> list[int]:
         """The geometries that touch a level surface first in the pose of the file."""
-        heights, start = {}, np.concatenate([np.zeros(3), self._pose, np.zeros(6)])[np.newaxis]
+        heights = {}
         for geom, part in zip(self._own, self._parts, strict=True):
             if geom in self._alone.pairs:
-                contact = self._alone.in_force_of(geom)
-                heights[geom] = Support([part]).lowest(start)[0] - _margin(contact)
+                heights[geom] = lowest_of([part], self._pose) - _margin(self._alone.in_force_of(geom))
         tolerance = SAME_HEIGHT * self._model.stat.extent
         return [geom for geom, height in heights.items() if height <= min(heights.values()) + tolerance]
 
@@ -253,7 +252,7 @@ class MuJoCoBody(LooseBody):
         if file.model.geom_type[alone.surface] != PLANE or not parts:
             return 0.0
         centre = alone.above_plane(file.data.xpos[alone.head]) + rotate(pose, self._offset)
-        return -float(Support(parts).lowest(np.concatenate([centre, pose, np.zeros(6)])[np.newaxis])[0])
+        return -float(centre[1] + lowest_of(parts, pose))
 
     def _points(self, pose: Array) -> int:
         """The number of contacts in a pose that share the weight evenly; 0 if they do not."""
@@ -261,7 +260,7 @@ class MuJoCoBody(LooseBody):
         data, size = mujoco.MjData(model), float(model.stat.extent)
         parts = [part for part in self._parts if part.collides]
         data.qpos[:] = [*(-rotate(pose, self._offset)), *np.roll(pose, 1)]
-        data.qpos[1] -= Support(parts).lowest(np.concatenate([np.zeros(3), pose, np.zeros(6)])[np.newaxis])[0] + FLAT * size
+        data.qpos[1] -= lowest_of(parts, pose) + FLAT * size
         with quiet():
             mujoco.mj_forward(model, data)
         places = data.contact.pos[:, [0, 2]]

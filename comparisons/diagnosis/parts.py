@@ -48,13 +48,12 @@ class Support:
 
     def __init__(self, parts: Sequence[Part]) -> None:
         corners = [part.position + rotate(part.turn, part.shape.hull) for part in parts]
-        is_round = [bool(part.shape.semi_axes.any()) for part in parts]
-        flat = np.concatenate([np.empty((0, 3)), *(one for one, rounded in zip(corners, is_round, strict=True) if not rounded)])
+        stretches = [part.shape.semi_axes[:, np.newaxis] * rotate(part.turn, AXES) for part in parts]
+        points, stretched = np.concatenate(corners), np.repeat(stretches, list(map(len, corners)), axis=0)
+        is_round = stretched.any(axis=(1, 2))
+        flat = points[~is_round]
         self._flat = flat[hull_corners(flat)] if len(flat) else flat
-        rounded = [(one, part) for one, part, is_ in zip(corners, parts, is_round, strict=True) if is_]
-        self._centres = np.concatenate([np.empty((0, 3)), *(one for one, _ in rounded)])
-        stretches = [part.shape.semi_axes[:, np.newaxis] * rotate(part.turn, AXES) for one, part in rounded for _ in one]
-        self._stretches = np.array(stretches).reshape(-1, 3, 3)
+        self._centres, self._stretches = points[is_round], stretched[is_round]
 
     def lowest(self, states: Array) -> Array:
         """Heights of the lowest point at states, shape (n,) [m]."""
@@ -63,6 +62,11 @@ class Support:
         heights = np.concatenate([up @ self._flat.T, up @ self._centres.T - depths], axis=1)
         found: Array = states[:, POSITION][:, 1] + heights.min(axis=1)
         return found
+
+
+def lowest_of(parts: Sequence[Part], turn: Array) -> float:
+    """The height of the lowest point of geometries above the centre of mass at an orientation, shape (4,) [m]."""
+    return float(Support(parts).lowest(np.concatenate([np.zeros(3), turn, np.zeros(6)])[np.newaxis])[0])
 
 
 def at_point(states: Array, arm: Array) -> Array:

@@ -15,7 +15,7 @@ import pybullet_data  # type: ignore[import-untyped]
 
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
-from dropspin.comparisons.diagnosis.parts import Part, Support, at_point
+from dropspin.comparisons.diagnosis.parts import Part, at_point, lowest_of
 from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Link, read_links
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.source import Ignored, Setting
@@ -173,12 +173,11 @@ class PyBulletBody(LooseBody):
         mass, squares = float(self._masses.sum()), np.sum(self._masses * np.sum(self._arms**2, axis=1))
         kappa = 0.0 if "damping" in self._changes else DAMPING
         plane = server().getDynamicsInfo(self._plane, -1)
-        owned = [(link, part) for link in self._links for part in link.parts(self._model, centre)]
-        parts, written = [part for _, part in owned], self._links[0].written
-        heights = [_height(part) for part in parts]
-        lowest = min(heights, default=0.0)
-        self._touching = [link for (link, _), height in zip(owned, heights, strict=True) if height <= lowest + SLOP] or self._links[:1]
-        touching, bottom = self._touching, [part for part, height in zip(parts, heights, strict=True) if height == lowest]
+        owned = [(link, part, _height(part)) for link in self._links for part in link.parts(self._model, centre)]
+        parts, written = [part for _, part, _ in owned], self._links[0].written
+        lowest = min((height for _, _, height in owned), default=0.0)
+        self._touching = [link for link, _, height in owned if height <= lowest + SLOP] or self._links[:1]
+        touching, bottom = self._touching, [part for _, part, height in owned if height == lowest]
         margin = MARGIN if any(part.shape.shape == "mesh" for part in bottom) else 0.0
         frictions, restitutions = {link.dynamics[1] for link in touching}, {(link.restitution, link.dynamics[9]) for link in touching}
         is_hard = all(link.dynamics[9] < 0.0 for link in touching)  # a spring and damper have no restitution
@@ -249,5 +248,4 @@ class PyBulletBody(LooseBody):
 
 def _height(part: Part) -> float:
     """The height of a geometry's lowest point in the file's pose, with the margin of a convex hull, above the centre of mass [m]."""
-    state = np.concatenate([np.zeros(3), Z_TO_Y, np.zeros(6)])[np.newaxis]
-    return float(Support([part]).lowest(state)[0]) - MARGIN * (part.shape.shape == "mesh")
+    return lowest_of([part], Z_TO_Y) - MARGIN * (part.shape.shape == "mesh")

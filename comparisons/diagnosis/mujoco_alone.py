@@ -40,6 +40,7 @@ class MuJoCoAlone:
         head: The number of the body in the file's model.
         group: The numbers of what is welded to it, its own first.
         geoms: The numbers of their geometries.
+        names: The names of all geometries of the file.
         surface: The number of what it lands on; None for nothing.
         others: The numbers of what else it collides with and may land on, unless what it lands on was named.
         missed: A plane of the file that it falls through, and why; empty if there is none.
@@ -53,10 +54,10 @@ class MuJoCoAlone:
         self.head = file.heads[name]
         self.group = file.group(self.head)
         self.geoms = [geom for geom in range(old.ngeom) if old.geom_bodyid[geom] in self.group]
-        names = list(file.names(GEOM))
+        self.names = list(file.names(GEOM))
         for geom in self.geoms:
-            if int(old.geom_type[geom]) not in map(int, MODELLED):
-                raise Breakdown("declined", f"its geometry {names[geom]!r} is a {kind_of(old, geom)}, which is not modelled")
+            if old.geom_type[geom] not in MODELLED:
+                raise Breakdown("declined", f"its geometry {self.names[geom]!r} is a {kind_of(old, geom)}, which is not modelled")
         self.surface = file.surface(on, self.geoms)
         self.others = file.surfaces(self.geoms)[1:] if on is None else []
         self.missed = file.missed(self.geoms)
@@ -154,7 +155,7 @@ class MuJoCoAlone:
         if old.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
             return found
         points, faces = mesh_of(old, geom)
-        name = f"mesh {self.geoms.index(geom)}" if geom in self.geoms else "mesh"
+        name = f"mesh {self.geoms.index(geom)}"
         mesh = spec.add_mesh(name=name, uservert=points.ravel(), userface=faces.ravel())
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
         return found | {"meshname": name}
@@ -168,24 +169,21 @@ class MuJoCoAlone:
         is_box = old.geom_type[self.surface] == BOX
         at = {"pos": -(size @ up) * is_box * UP, "quat": np.roll(turn, 1), "size": np.where(is_box & (up < 0.5), WIDE, size)}
         spec.worldbody.add_geom(name="surface", contype=0, conaffinity=0, **self._geom(spec, self.surface) | at)
-        for geom, pair in self.pairs.items():
-            spec.add_pair(geomname1="surface", geomname2=f"own {self.geoms.index(geom)}", **self._in_force(pair))
+        for geom in self.pairs:
+            spec.add_pair(geomname1="surface", geomname2=f"own {self.geoms.index(geom)}", **self.in_force_of(geom))
 
-    def _in_force(self, pair: Mapping[str, Any]) -> dict[str, Any]:
-        """The settings of a contact, with the time constant that MuJoCo raises to two of the file's steps."""
+    def in_force_of(self, geom: int) -> dict[str, Any]:
+        """The settings in force of the contact of a geometry, with the time constant that MuJoCo raises to two of the file's steps."""
+        pair = self.pairs[geom]
         changed = {name: np.array(str(self._changes[name]).split(), float) for name in ("solref", "solimp") if name in self._changes}
         still = {"margin": 0.0, "gap": 0.0} if "margin" in self._changes else {}
-        return dict(pair) | {"solref": self.clamped(pair)} | ({} if overrides(self.file.model) else changed | still)
+        return pair | {"solref": self.clamped(pair)} | ({} if overrides(self.file.model) else changed | still)
 
     def clamped(self, pair: Mapping[str, Any]) -> Array:
         """The time constant and the damping ratio that are in force at the file's time step."""
-        option, (constant, ratio) = self.file.model.opt, pair["solref"]
-        is_safe = not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE
-        return np.array([max(constant, 2.0 * option.timestep) if constant > 0.0 and is_safe else constant, ratio])
-
-    def in_force_of(self, geom: int) -> dict[str, Any]:
-        """The settings in force of the contact of a geometry."""
-        return self._in_force(self.pairs[geom])
+        constant, ratio = pair["solref"]
+        is_raised = constant > 0.0 and self.file.is_safe
+        return np.array([max(constant, 2.0 * self.file.model.opt.timestep) if is_raised else constant, ratio])
 
     @property
     def contact(self) -> SoftContact | None:
@@ -197,8 +195,7 @@ class MuJoCoAlone:
         friction = tuple(touching["friction"][OF_GEOM].tolist())
         names = ("solref", "solimp", "condim", "margin")
         settings = GeomSettings(friction=friction, **{name: plain(np.asarray(touching[name])) for name in names})
-        is_safe = not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE
-        return SoftContact(settings, option.cone == ELLIPTIC, option.impratio, option.timestep if is_safe else 0.0)
+        return SoftContact(settings, option.cone == ELLIPTIC, option.impratio, option.timestep if self.file.is_safe else 0.0)
 
     def above_plane(self, point: Array) -> Array:
         """A point of the file's world [m] as seen from the plane that the body lands on, where it is level."""

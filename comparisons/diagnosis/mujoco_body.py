@@ -13,7 +13,7 @@ from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, Loos
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
 from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of
-from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ENUMERATIONS, GEOM, OPTIONS, PLANE, MuJoCoFile
+from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ENUMERATIONS, OPTIONS, PLANE, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.diagnosis.parts import Part, at_point, lowest_of
@@ -155,7 +155,7 @@ class MuJoCoBody(LooseBody):
         raised = any(not np.array_equal(alone.clamped(pair), pair["solref"]) for pair in alone.pairs.values())
         drag, option = Drag(*alone.damping), self._model.opt
         unmodelled = {"frictionloss": self._model.dof_frictionloss.any(), "density": option.density, "viscosity": option.viscosity}
-        inside = 0.0 if surface is None or self._names[surface] == ADDED else self._start_inside(self._pose)
+        inside = 0.0 if surface is None or alone.names[surface] == ADDED else self._start_inside()
         is_beside = surface is not None and file.model.geom_type[surface] != PLANE and math.isinf(file.height_above(surface, alone.geoms))
         start = ["a start beside or below the surface"] * is_beside + [f"a start {inside:.3g} m inside the surface"] * (
             inside > DEEP * self._model.stat.extent
@@ -163,7 +163,7 @@ class MuJoCoBody(LooseBody):
         tilted = [f"a gravity {off:.3g}° from the inward normal of the surface"] * (off > LEVEL)
         every = {friction_of(one) for one in self._touching.values()}
         frictions = (0.0, 0.0) if touching is None else next(iter(every)) if len(every) == 1 else (math.nan, math.nan)
-        names = ", ".join(self._names[geom] for geom in self._touching)
+        names = ", ".join(alone.names[geom] for geom in self._touching)
         several = [f"a slide on geometries of different friction ({names})"] * (len(every) > 1)
         return Facts(
             name=self._name,
@@ -182,13 +182,13 @@ class MuJoCoBody(LooseBody):
             armature=alone.armature,
             lifted=self._lifted,
             unknown=[name for name, acts in unmodelled.items() if acts],
-            surface="" if surface is None else self._names[surface],
-            others=[self._names[geom] for geom in alone.others],
+            surface="" if surface is None else alone.names[surface],
+            others=[alone.names[geom] for geom in alone.others],
             friction=frictions[0],
             friction_across=math.nan if frictions[0] == frictions[1] else frictions[1],
             margin=0.0 if touching is None else _margin(touching),
             rolling=touching is not None and touching["condim"] == 6 and bool(np.any(touching["friction"][3:])),
-            rest_depth=self._rest_depth(self._pose),
+            rest_depth=self._rest_depth(),
             written=self._text.written,
             settings=self._text.settings,
             ignored=list(self._text.ignored(self._properties, raised=raised, condim=0 if touching is None else int(touching["condim"]))),
@@ -213,7 +213,7 @@ class MuJoCoBody(LooseBody):
         turn = quaternion(data.geom_xmat[number])
         position = data.geom_xpos[number] - self._offset + rotate(turn, shift)
         geom, pairs = self._own[number], self._alone.pairs
-        return Part(self._names[geom], shape, position, multiply(turn, turned), not pairs or geom in pairs)
+        return Part(self._alone.names[geom], shape, position, multiply(turn, turned), not pairs or geom in pairs)
 
     @property
     def _lowest(self) -> list[int]:
@@ -230,37 +230,33 @@ class MuJoCoBody(LooseBody):
         """The numbers of the geometries in the file, in the order of the model alone."""
         return [self._alone.geoms[int(self._model.geom(number).name.split()[1])] for number in range(self._model.ngeom)]
 
-    @cached_property
-    def _names(self) -> list[str]:
-        return list(self._file.names(GEOM))
-
-    def _rest_depth(self, pose: Array) -> float:
+    def _rest_depth(self) -> float:
         """The depth of a body that rests on one point, or on several that share its weight, below the surface [m]; NaN of others."""
         contact, armature = self._alone.contact, self._alone.armature
         is_central = not (armature and self._offset.any()) and self._lifted < 1.0 and not np.ptp(self._model.body_gravcomp[1:])
-        points = self._points(pose) if contact is not None and is_central else 0
+        points = self._points() if contact is not None and is_central else 0
         if not points or contact is None:
             return np.nan
         mass = self._properties.mass
         load = float(np.linalg.norm(self._file.gravity)) * (1.0 - self._lifted) * mass / (mass + armature) / points
         return contact.depth(load) - contact.settings.margin
 
-    def _start_inside(self, pose: Array) -> float:
+    def _start_inside(self) -> float:
         """How far below a plane the body's lowest point is in the file [m]; 0 if it lands on a box, which it may be beside."""
         alone, file = self._alone, self._file
         parts = [part for part in self._parts if part.collides]
         if file.model.geom_type[alone.surface] != PLANE or not parts:
             return 0.0
-        centre = alone.above_plane(file.data.xpos[alone.head]) + rotate(pose, self._offset)
-        return -float(centre[1] + lowest_of(parts, pose))
+        centre = alone.above_plane(file.data.xpos[alone.head]) + rotate(self._pose, self._offset)
+        return -float(centre[1] + lowest_of(parts, self._pose))
 
-    def _points(self, pose: Array) -> int:
-        """The number of contacts in a pose that share the weight evenly; 0 if they do not."""
+    def _points(self) -> int:
+        """The number of contacts in the pose of the file that share the weight evenly; 0 if they do not."""
         model = self._alone.model(self._file.model.opt.timestep, np.zeros(3), floor=True)
         data, size = mujoco.MjData(model), float(model.stat.extent)
         parts = [part for part in self._parts if part.collides]
-        data.qpos[:] = [*(-rotate(pose, self._offset)), *np.roll(pose, 1)]
-        data.qpos[1] -= lowest_of(parts, pose) + FLAT * size
+        data.qpos[:] = [*(-rotate(self._pose, self._offset)), *np.roll(self._pose, 1)]
+        data.qpos[1] -= lowest_of(parts, self._pose) + FLAT * size
         with quiet():
             mujoco.mj_forward(model, data)
         places = data.contact.pos[:, [0, 2]]

@@ -26,7 +26,7 @@ from dropspin.scenarios.text import printable
 BODY, GEOM = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_GEOM
 PLANE, BOX = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX
 EQUALITIES = "equality constraints"
-SURFACES = (PLANE, BOX)
+SURFACES = (int(PLANE), int(BOX))
 """The kinds of geometries that a body may land on."""
 ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
 ENUMERATIONS = {"RK4": int(mujoco.mjtIntegrator.mjINT_RK4), "elliptic": ELLIPTIC}
@@ -74,6 +74,7 @@ class MuJoCoFile:
         flags, bit = self.model.opt.disableflags, mujoco.mjtDisableBit
         self.gravity = np.zeros(3) if flags & bit.mjDSBL_GRAVITY else np.array(self.model.opt.gravity)
         self.has_contacts = not flags & (bit.mjDSBL_CONTACT | bit.mjDSBL_CONSTRAINT)
+        self.is_safe = not flags & bit.mjDSBL_REFSAFE
 
     def _compiled(self, path: Path) -> Any:
         """The model, with an additional plane; an impossible inertia is balanced, and `refusal` has MuJoCo's reason."""
@@ -172,20 +173,17 @@ class MuJoCoFile:
     def surfaces(self, own: Sequence[int]) -> list[int]:
         """The planes and boxes of the world that some geometries collide with: those below them by height, then the other ones.
 
-        A plane that is added if there is none, or if none of them is below, and something of another kind may be.
+        Of these, planes that gravity does not lead away from come before boxes, and boxes before other planes. A plane that is added if
+        there is none, or if none of them is below, and something of another kind may be.
         """
-        found = self._planes_and_boxes(own)
-        return found if found and not self.left_out(own) else [self.names(GEOM)[ADDED]] * self._collide(own, self.names(GEOM)[ADDED])
-
-    def _planes_and_boxes(self, own: Sequence[int]) -> list[int]:
-        """The planes and boxes that some geometries collide with: those below, planes that gravity does not lead away from, boxes."""
-        found = [geom for geom in self._still(own) if int(self.model.geom_type[geom]) in map(int, SURFACES) and self._collide(own, geom)]
+        added = self.names(GEOM)[ADDED]
+        found = [geom for geom in self._still(own) if self.model.geom_type[geom] in SURFACES and self._collide(own, geom)]
 
         def rank(geom: int) -> tuple[float, bool, bool]:
             is_plane = self.model.geom_type[geom] == PLANE
             return self.height_above(geom, own), is_plane and self.data.geom_xmat[geom][[2, 5, 8]] @ self._down > -ALONG, not is_plane
 
-        return sorted(found, key=rank)
+        return sorted(found, key=rank) if found and not self.left_out(own) else [added] * self._collide(own, added)
 
     def height_above(self, surface: int, own: Sequence[int]) -> float:
         """The height of the top of some geometries above a plane or a box that is below the centre of mass of their bodies [m].
@@ -217,7 +215,7 @@ class MuJoCoFile:
         """The geometries of the world that some collide with and that are no planes and boxes, if none of these is below; else empty."""
         names = list(self.names(GEOM))
         found = [geom for geom in self._still(own) if self.has_contacts and self._collide(own, geom)]
-        flat = [geom for geom in found if int(self.model.geom_type[geom]) in map(int, SURFACES)]
+        flat = [geom for geom in found if self.model.geom_type[geom] in SURFACES]
         if any(math.isfinite(self.height_above(geom, own)) for geom in flat):
             return ""
         words = [f"the {kind_of(self.model, geom)} {names[geom]}" for geom in found if geom not in flat]
@@ -242,7 +240,7 @@ class MuJoCoFile:
             return next(iter(self.surfaces(own)), None)
         others = {name: geom for name, geom in self.names(GEOM).items() if geom not in own}
         verify_known("the model's geometry", [wanted], others)
-        if int(self.model.geom_type[others[wanted]]) not in map(int, SURFACES):
+        if self.model.geom_type[others[wanted]] not in SURFACES:
             raise DropspinError(f"--on {wanted}: is neither a plane nor a box; name one of these.")
         return others[wanted]
 

@@ -91,7 +91,7 @@ def test_gain_of_energy_is_a_time_step_error_that_rk4_removes(tmp_path):
 def test_depth_at_rest_is_exact(tmp_path, geom, option, points):
     body = body_of(tmp_path, FREE.format(geom), option)
     depth = by_quantity(rest(body, ladder(body)))["penetration"]
-    assert body._points(body.facts.pose) == points
+    assert body._points() == points
     assert depth.measured == pytest.approx(depth.in_force, abs=1e-8)
 
 

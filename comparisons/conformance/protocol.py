@@ -8,6 +8,7 @@ import os
 import tempfile
 from collections.abc import Sequence
 from contextlib import chdir
+from functools import partial
 
 import numpy as np
 
@@ -51,7 +52,7 @@ def check_claims(engine: Engine) -> str:
 
 def check_refusals(engine: Engine) -> str:
     """Scenes are declined with a reason, and not all of them."""
-    scenes = [load(name) for name in names()]
+    scenes = list(map(load, names()))
     for scene in [*scenes, *(probe.scene for probe in PROBES)]:
         answer, again = engine.declines(scene), engine.declines(scene)
         if answer != again:
@@ -67,7 +68,7 @@ def check_refusals(engine: Engine) -> str:
 def check_builds(engine: Engine) -> str:
     """The built simulation equals the scene, for the probes and for every scene of the catalogue."""
     read_back = []
-    for scene in [ASYMMETRIC, *(probe.scene for probe in PROBES), *(load(name) for name in names())]:
+    for scene in [ASYMMETRIC, *(probe.scene for probe in PROBES), *map(load, names())]:
         if engine.refusal(scene) is not None:
             continue
         try:
@@ -214,17 +215,17 @@ def states_of_variants(entry: EngineEntry, which: Sequence[int] = ()) -> list[Ar
 
     None where the engine raises an exception.
     """
-    engine = entry.adapter
+    engine, other = entry.adapter, partial(times, OTHER)
     scene = accepted_scene(engine)
     lighter = (OTHER * scene.body.inertia_tensor).tolist()
     variants = [
         scene,
         with_size(scene, OTHER * scene.body.size),
-        with_values(scene, "body", mass=lambda mass: OTHER * mass),
+        with_values(scene, "body", mass=other),
         with_values(scene, "body", inertia=lighter),
-        with_values(scene, "floor", restitution=lambda restitution: OTHER * restitution),
+        with_values(scene, "floor", restitution=other),
         with_values(scene, "floor", friction=A_FRICTION),
-        with_values(scene, "gravity", acceleration=lambda acceleration: times(OTHER, acceleration)),
+        with_values(scene, "gravity", acceleration=other),
         scene.starting_at(scene.initial_state * np.repeat([1.0, OTHER], [7, 6])),
     ]
     accepted = [variant for variant in dict.fromkeys(variants) if engine.refusal(variant) is None]

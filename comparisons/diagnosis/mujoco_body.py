@@ -204,16 +204,14 @@ class MuJoCoBody(LooseBody):
 
     @cached_property
     def _parts(self) -> Sequence[Part]:
-        return [self._part(geom) for geom in range(self._model.ngeom)]
-
-    def _part(self, number: int) -> Part:
-        """A geometry as a shape, relative to the centre of mass."""
-        model, data = self._model, self._at_rest
-        shape, shift, turned = shape_of(model, number)
-        turn = quaternion(data.geom_xmat[number])
-        position = data.geom_xpos[number] - self._offset + rotate(turn, shift)
-        geom, pairs = self._own[number], self._alone.pairs
-        return Part(self._alone.names[geom], shape, position, multiply(turn, turned), not pairs or geom in pairs)
+        """The geometries as shapes, relative to the centre of mass."""
+        data, pairs, found = self._at_rest, self._alone.pairs, []
+        for number, geom in enumerate(self._own):
+            shape, shift, turned = shape_of(self._model, number)
+            turn = quaternion(data.geom_xmat[number])
+            position = data.geom_xpos[number] - self._offset + rotate(turn, shift)
+            found.append(Part(self._alone.names[geom], shape, position, multiply(turn, turned), not pairs or geom in pairs))
+        return found
 
     @property
     def _lowest(self) -> list[int]:

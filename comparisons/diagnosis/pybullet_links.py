@@ -141,9 +141,7 @@ def read_links(file: UrdfFile, body: int) -> list[Link]:
 @cache
 def _visual(file: UrdfFile, link: Element) -> Sequence[Any]:
     """The visual geometries of a link, as PyBullet has them if they collide."""
-    text = "".join(
-        file.written(element).replace("<visual", "<collision").replace("</visual", "</collision") for element in link.every("visual")
-    )
+    text = "".join(map(file.written, link.every("visual"))).replace("<visual", "<collision").replace("</visual", "</collision")
     number = load(file.given, f'<robot name="visual"><link name="visual">{text}</link></robot>')
     found: Sequence[Any] = server().getCollisionShapeData(number, -1)
     server().removeBody(number)

@@ -5,6 +5,7 @@ Accuracy is measured over the scene's duration; all other criteria use the whole
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -33,6 +34,8 @@ NEVER_RESTS = 1.5  # times the speed that gravity adds in a step, which a restin
 SAME_SPEED = 1e-15  # relative; speeds closer than this are equal to the last digit, also if they are norms
 HELD = 3  # rows in which a clamped speed is equal to the last digit
 SUDDEN = 1e-6  # relative; the least change of a speed from row to row just before a clamp; one that settles changes less
+same_speed = partial(math.isclose, rel_tol=1e-9)
+"""Whether speeds from two initial states are equal."""
 
 
 class Diagnosis(NamedTuple):
@@ -199,14 +202,12 @@ class HeldSpeed(NamedTuple):
 
     def shared(self, other: "HeldSpeed") -> float:
         """The value at which this speed and that from another initial state are clamped; NaN if they are not."""
-        components = [
-            value for value in self.components if any(math.isclose(value, of_other, rel_tol=1e-9) for of_other in other.components)
-        ]
+        components = [value for value in self.components if any(same_speed(value, of_other) for of_other in other.components)]
         most = max(components, default=math.nan)
-        if not math.isclose(self.norm, other.norm, rel_tol=1e-9):
+        if not same_speed(self.norm, other.norm):
             return most
-        alike = sum(math.isclose(value, most, rel_tol=1e-9) for value in components)
-        are_components = math.isclose(self.norm, math.sqrt(alike) * most, rel_tol=1e-9)  # each of them is clamped, and so is the length
+        alike = sum(same_speed(value, most) for value in components)
+        are_components = same_speed(self.norm, math.sqrt(alike) * most)  # each of them is clamped, and so is the length
         return most if are_components else self.norm
 
 

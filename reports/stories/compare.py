@@ -1,6 +1,7 @@
 """The output of `dropspin compare`: the changes between two runs."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 from dropspin.comparisons.regressions.changes import EqualMotions, SpeedChange
@@ -36,18 +37,16 @@ def _verdict(changes: Changes) -> str:
     return "The result is not worse." if len(changes.results) == 1 else f"None of {total} is worse."
 
 
-def _tables(changes: Changes) -> list[Part]:
+def _tables(changes: Changes) -> Iterator[Part]:
     """A table for each kind of change, with the largest change of each engine in each scene."""
-    parts: list[Part] = []
     for change, word in TITLES.items():
         changed = changes.of(change)
         groups = [group for _, group in changed.groupby(["engine", "scene"], sort=False)]  # which probably have one cause
         if groups:
             more = f", the first {MOST_LINES} of {len(groups)} pairs of a scene and an engine" if len(groups) > MOST_LINES else ""
             rows = [_row(group.iloc[0].to_dict(), len(group)) for group in groups[:MOST_LINES]]
-            parts.append(Heading(f"{word}: {counted(len(changed), 'result')}{more}", on_terminal=True))
-            parts.append(Table(rows))
-    return parts
+            yield Heading(f"{word}: {counted(len(changed), 'result')}{more}", on_terminal=True)
+            yield Table(rows)
 
 
 def change_cells(row: Row) -> dict[str, str]:

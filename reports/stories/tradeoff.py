@@ -1,7 +1,7 @@
 """The output of `dropspin tradeoff`: the Pareto front, and the cheapest configuration within each tolerance."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -170,26 +170,23 @@ def _times(ratio: float) -> str:
     return f"{ratio:.1f} times" if ratio < 10.0 else f"{rounded(ratio, 2)} times"
 
 
-def _timings(study: TradeOff) -> list[str]:
+def _timings(study: TradeOff) -> Iterator[str]:
     """Sentences on timings that differ between rounds, what they leave undecided, and other load on the machine."""
-    listed = []
-    undecided = study.undecided
-    if undecided:
+    if undecided := study.undecided:
         are = counted(len(undecided), "configuration is", "configurations are")
         those = ", ".join(map(_named, undecided))
-        listed.append(f"{are} on the Pareto front in only some of the rounds, so the timings are not decisive: {those}.")
+        yield f"{are} on the Pareto front in only some of the rounds, so the timings are not decisive: {those}."
     if study.spread >= LEVEL:
-        listed.append(f"Timings vary: the median over the rounds is typically {study.spread:.2g} times the shortest (column cost_spread).")
+        yield f"Timings vary: the median over the rounds is typically {study.spread:.2g} times the shortest (column cost_spread)."
     batches = [(value, size, point) for point in study.points for size, value in point.spreads_per_world.items() if value >= LEVEL]
     if batches:
         value, size, point = max(batches, key=lambda batch: batch[0])
-        listed.append(f"Timings of batches vary by a factor of up to {value:.2g}, for {_named(point)} in a batch of {size}.")
+        yield f"Timings of batches vary by a factor of up to {value:.2g}, for {_named(point)} in a batch of {size}."
     if study.load >= BUSY:
-        listed.append(
+        yield (
             f"The machine was busy while costs were measured: {study.load:.1f} other threads per processor were running, on average; "
             "measure again on an idle machine."
         )
-    return listed
 
 
 def _reason(ladder: Ladder) -> str:

@@ -88,7 +88,7 @@ class BodyText:
             values = next(inertial.every("inertia"), inertial).attributes
             numbers = [float(values.get(name, 0.0)) for name in OF_URDF]
         else:
-            numbers = [float(value) for value in values.get("diaginertia", values.get("fullinertia", "")).split()]
+            numbers = list(map(float, values.get("diaginertia", values.get("fullinertia", "")).split()))
         return np.array(symmetric([*numbers, 0.0, 0.0, 0.0][:6])) if numbers else None
 
     @cached_property

@@ -168,7 +168,7 @@ def diagnose(
             text = MESH.format(path=path.resolve(), inertia=inertia_of, name=path.stem, density=density)
             path = Path(folder, "mesh.xml")
             path.write_text(text, encoding="utf-8")
-        entries = [present_entry(engine) for engine in chosen]
+        entries = list(map(present_entry, chosen))
         with started_crews(1, 1, entries, resources) as crews:
             read = [(entry, crews[0].call(entry, _bodies, path, given, wanted, loose)) for entry in entries]
         pieces = [(entry, name) for entry, names in read if isinstance(names, list) for name in names]

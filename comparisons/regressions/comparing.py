@@ -166,7 +166,7 @@ def history(runs: Mapping[str, Results]) -> History:
         {"run": name, "started": one.provenance["started"], "commit": one.provenance["commit"]} | versions_behind(one.provenance)
         for name, one in ordered
     ]
-    measured = [comparable_results(one) for one in results]
+    measured = list(map(comparable_results, results))
     every = pd.concat([rows.assign(run=number) for number, rows in enumerate(measured)], ignore_index=True)
     return History(names, pd.DataFrame(stamps), every, _moves(results, measured))
 

@@ -26,7 +26,7 @@ WHOLE_NUMBERS = frozenset({"ensemble.size", "ensemble.seed"})
 
 
 def _unique(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    if len({repr(value) for value in values}) < len(values):
+    if len(set(map(repr, values))) < len(values):
         raise ValueError("names one twice; name each once")
     return values
 
@@ -148,7 +148,7 @@ def _axes(where: str, table: Mapping[str, Any], draws: Draws | None = None) -> l
             axes.append(Drawn(name, **validated(Range, here, entry).model_dump(), count=draws.count, seed=draws.seed))
         elif isinstance(entry, list) and entry and draws is None:
             values = tuple(_canonical(here, name, value) for value in entry)
-            if len({repr(value) for value in values}) < len(values):
+            if len(set(map(repr, values))) < len(values):
                 raise DropspinError(f"{here}: names a value twice; name each once.")
             axes.append(Listed(name, values))
         else:

@@ -50,7 +50,7 @@ def limits_command(scenes: tuple[str, ...], axes: tuple[str, ...], output: str, 
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.scenarios import load
 
-    loaded = [load(name) for name in scenes or SCENES]
+    loaded = list(map(load, scenes or SCENES))
     if len({scene.name for scene in loaded}) < len(loaded):
         raise click.UsageError("a scene is given twice, or two files have the same name; give each scene once, or rename a file.")
     lacking = {scene.name: [name for name in axes if name in AXES and not AXES[name].applies(scene)] for scene in loaded}

@@ -42,7 +42,7 @@ def symmetries_command(scenes: tuple[str, ...], dt: float, output: str, json_out
     from dropspin.scenarios import load
 
     with written_study(output, json_output) as keep:
-        loaded = [load(name) for name in scenes or SCENES]
+        loaded = list(map(load, scenes or SCENES))
         with share_bar("symmetries") as on_progress:
             findings = symmetries(loaded, dt=dt, **options, on_progress=on_progress)
         folder = keep(Symmetries(findings=findings))

@@ -54,7 +54,7 @@ def tradeoff_command(scenes: tuple[str, ...], within: tuple[float, ...], output:
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.scenarios import load
 
-    loaded, results = [load(name) for name in scenes or ("spin-asymmetric",)], []
+    loaded, results = list(map(load, scenes or ("spin-asymmetric",))), []
     with written_study(output, json_output) as keep:
         for scene in loaded:
             try:

@@ -51,7 +51,7 @@ class Diagnosed(Study):
         by_name, measured = grouped(bodies, lambda body: body.name), [body for body in bodies if not body.breakdown]
         parts.append(Paragraph(COLUMNS, on_terminal=False))
         if len(by_name) > 1:
-            parts.append(Table([_overview(body) for body in bodies], ["mass", "lands on"]))
+            parts.append(Table(list(map(_overview, bodies)), ["mass", "lands on"]))
         for of_name in by_name.values():
             for body in of_name:
                 parts += _body_parts(body, on_terminal=len(measured) <= 1)
@@ -145,7 +145,7 @@ def answer_rows(body: BodyDiagnosis) -> Rows:
     shown = [answer for answer in body.answers if answer not in moments and answer.question not in ("file", "friction")]
     for _, group in groupby(shown, lambda answer: (answer.question, answer.quantity, _cells(answer))):
         same = list(group)
-        kinds = ", ".join(dict.fromkeys(_kind(finding) for finding in same[0].findings))
+        kinds = ", ".join(dict.fromkeys(map(_kind, same[0].findings)))
         rows.append(_row(body, same[0].question, _together(same), *_cells(same[0]), kinds))
     return rows
 

@@ -59,7 +59,7 @@ def _cell(findings: Sequence[Finding]) -> str:
     if not findings or findings[0].status == "not run":
         return "–"
     worst = findings[0]
-    return f"{MEANINGS[worst.status][0]} {worst.difference:.0e}" if worst.difference else f"{MEANINGS[worst.status][0]} 0"
+    return f"{MEANINGS[worst.status][0]} {f'{worst.difference:.0e}' if worst.difference else 0}"
 
 
 def worst_lost(findings: Sequence[Finding]) -> list[Finding]:

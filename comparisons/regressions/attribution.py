@@ -69,9 +69,8 @@ def changed_settings(old: Stamp, new: Stamp, engine: str) -> dict[str, str]:
     before, after = (stamp["settings"].get(engine, {}) for stamp in (old, new))
     pairs = [(before[case], after[case]) for case in before if case in after]
     if ACCEPTED in before:
-        now = common_settings(new, engine)
-        both = now.keys() & before[ACCEPTED].keys()
-        pairs = [({name: before[ACCEPTED][name] for name in both}, {name: now[name] for name in now if name in both})]
+        accepted, now = before[ACCEPTED], common_settings(new, engine)
+        pairs = [({name: accepted[name] for name in accepted if name in now}, {name: now[name] for name in now if name in accepted})]
     texts = [[{name: _text(value) for name, value in case.items() if name not in VERSIONS} for case in pair] for pair in pairs]
     return {name: was.get(name, "") for was, now in texts for name in {**was, **now} if was.get(name) != now.get(name)}
 

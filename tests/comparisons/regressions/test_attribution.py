@@ -2,7 +2,7 @@
 
 import pytest
 
-from dropspin.comparisons.regressions.attribution import CORRECTION, attribute
+from dropspin.comparisons.regressions.attribution import ACCEPTED, CORRECTION, attribute, changed_settings
 
 STAMP = {
     "versions": {"dropspin": "1", "numpy": "2", "numba": "3", "scipy": "4"},
@@ -76,3 +76,10 @@ def test_changed_motions_of_wang_s_method_are_a_change_of_dropspin_not_a_correct
     stamp = STAMP | {"settings": {"wang": STAMP["settings"]["candidate"]}}
     found = attribute(stamp, stamp | {"code": "d"}, "wang", [], "different")
     assert (found.origin, found.message) == ("dropspin", "a change of dropspin, of which wang is a part: dropspin's own code")
+
+
+def test_settings_that_differ_from_accepted_ones_are_in_the_order_of_these():
+    """Not in that of a set, which is another one in each process."""
+    accepted = {f"setting-{number}": "1" for number in range(40)}
+    old, new = ({"settings": {"made": settings}} for settings in ({ACCEPTED: accepted}, {"case": dict.fromkeys(accepted, 2)}))
+    assert list(changed_settings(old, new, "made")) == list(accepted)

@@ -21,18 +21,16 @@ from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.running.resources import FIVE_MINUTES, ResourceLimits
-from dropspin.scenarios.state import ORIENTATION, POSITION
+from dropspin.scenarios.state import ORIENTATION, POSITION, Array
 
 ANY_ENGINE = "any engine"
 ENGINES = ("mujoco", "wang[contact=sequential,law=coulomb]")
 FRAMES = 8
 """Frames after the last one of the flight."""
 FINE_STEPS = 32, 64
-"""Time steps of the engines in a frame: an impact is up to a step late, so that restitution is fitted too large by a part that falls with
-the step. What is left of it at the finer step is about the difference between the two.
+"""Time steps of the engines in a frame: an impact is up to a step late, so that restitution is fitted too large by a part that is
+proportional to the step. Estimates at both are extrapolated to a step of 0.
 """
-Steps = tuple[Profile, Profile]
-"""The estimates of an engine at the coarser and at the finer time step."""
 EQUAL = 0.02
 """Difference of a parameter between engines that may be neglected: in a restitution of 0.4, it changes a rebound's height by a tenth."""
 
@@ -137,12 +135,12 @@ def log_fit(
     """
     entries, flights = engine_entries(engines, ENGINES), flights_in(recording)
     problems = [problem_of(flights, frames, steps) for steps in FINE_STEPS]
-    fitted, left_out = of_each_engine(entries, partial(_profiles, problems), on_progress, resources, jobs)
+    fitted, left_out = of_each_engine(entries, partial(_profile, problems), on_progress, resources, jobs)
     size, friction = len(problems[0].measured), None
     estimates: list[Estimate] = []
     transfers: list[Transfer] = []
     for parameter in FIRST_GRID:
-        of_each = {label: _estimate(label, parameter, profiles, size) for label, profiles in fitted.items()}
+        of_each = {label: _estimate(label, parameter, profile, size) for label, profile in fitted.items()}
         identified = {label: fitted[label] for label, one in of_each.items() if one.has_lower or one.has_upper}
         bounded = {label: fitted[label] for label, one in of_each.items() if one.has_lower and one.has_upper}
         estimates += of_each.values()
@@ -151,22 +149,37 @@ def log_fit(
         ]
         if parameter == "friction" and len(bounded) > 1:
             friction = _of_all(parameter, bounded, size)
-    discrepancies = {label: finer.discrepancy for label, (_, finer) in fitted.items()}
+    discrepancies = {label: profile.discrepancy for label, profile in fitted.items()}
     return LogFit(size, frames, tuple(estimates), tuple(transfers), friction, discrepancies, left_out, _touches(problems[0]))
 
 
-def _profiles(
+def _profile(
     problems: Sequence[Problem], entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]
-) -> Steps | Breakdown:
-    """The estimates of an engine at the two time steps."""
+) -> Profile | Breakdown:
+    """The estimates of an engine at a time step of 0."""
     found = []
     for problem in problems:
         profile = profile_of(problem, entry, processes, report)
         if isinstance(profile, Breakdown):
             return profile
         found.append(profile)
-    coarser, finer = found
-    return coarser, finer
+    return _without_step(*found)
+
+
+def _without_step(coarser: Profile, finer: Profile) -> Profile:
+    """The estimates extrapolated to a time step of 0, resample by resample.
+
+    How late an impact is differs from toss to toss, evenly between 0 and a step, so that what the extrapolation leaves of it has no mean,
+    and is scatter of the tosses that the resamples show. An estimate at an end of the values that are tried may be any beyond it, and is
+    not extrapolated from.
+    """
+    first, last = (np.array([tried[end] for tried in FIRST_GRID.values()]) for end in (0, -1))
+
+    def extrapolated(coarse: Array, fine: Array) -> Array:
+        return np.where((coarse == first) | (coarse == last), fine, np.clip(2.0 * fine - coarse, first, last))
+
+    lower, upper = np.sort([extrapolated(coarser.lower, finer.lower), extrapolated(coarser.upper, finer.upper)], axis=0)
+    return Profile(lower, upper, extrapolated(coarser.best, finer.best), finer.discrepancy)
 
 
 def _touches(problem: Problem) -> bool:
@@ -175,26 +188,21 @@ def _touches(problem: Problem) -> bool:
     return bool(heights(problem.header, poses[:, POSITION], poses[:, ORIENTATION]).min() < NEAR_FLOOR * problem.header.body.size)
 
 
-def _estimate(label: str, parameter: str, profiles: Steps, size: int) -> Estimate:
-    """A parameter of an engine at the finer step, from the tosses and their resamples; its interval contains the effect of the step."""
-    tried, column, (coarser, finer) = FIRST_GRID[parameter], list(FIRST_GRID).index(parameter), profiles
-    lower, upper = expanded(finer.lower[:, column], finer.upper[:, column], size)
-    has_lower, has_upper = bool(lower > tried[0]), bool(upper < tried[-1])
-    by_step = abs(float(finer.value[column] - coarser.value[column])) if has_lower and has_upper else 0.0
-    lower, upper = max(lower - by_step, float(tried[0])), min(upper + by_step, float(tried[-1]))
-    return Estimate(label, parameter, float(finer.value[column]), lower, upper, has_lower, has_upper)
+def _estimate(label: str, parameter: str, profile: Profile, size: int) -> Estimate:
+    """A parameter of an engine, from the tosses and their resamples."""
+    tried, column = FIRST_GRID[parameter], list(FIRST_GRID).index(parameter)
+    lower, upper = expanded(profile.lower[:, column], profile.upper[:, column], size)
+    return Estimate(label, parameter, float(profile.value[column]), lower, upper, bool(lower > tried[0]), bool(upper < tried[-1]))
 
 
-def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Steps], size: int, *, are_bounded: bool) -> Transfer:
+def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Profile], size: int, *, are_bounded: bool) -> Transfer:
     """The difference of a parameter between two engines, resample by resample, at both ends of the values that are as good as the best.
 
     Estimates that are bounded on one side alone may be shown to differ, but not to be equal.
     """
-    column, (coarse, one), (other_coarse, other) = list(FIRST_GRID).index(parameter), fitted[first], fitted[second]
+    column, one, other = list(FIRST_GRID).index(parameter), fitted[first], fitted[second]
     ends = np.stack([one.lower - other.lower, one.upper - other.upper])[..., column]
     lower, upper = expanded(ends.min(axis=0), ends.max(axis=0), size)
-    by_step = abs(float((one.value - coarse.value - other.value + other_coarse.value)[column]))
-    lower, upper = lower - by_step, upper + by_step
     differs = lower > 0.0 or upper < 0.0
     if not are_bounded and not differs:  # the ends may be those of the values that were tried
         lower, upper = -math.inf, math.inf
@@ -202,14 +210,14 @@ def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Step
     return Transfer(parameter, first, second, float(one.value[column] - other.value[column]), lower, upper, verdict)
 
 
-def _of_all(parameter: str, fitted: Mapping[str, Steps], size: int) -> Estimate:
+def _of_all(parameter: str, fitted: Mapping[str, Profile], size: int) -> Estimate:
     """A parameter whichever engine continues the tosses, as the mean over engines that differ at random.
 
     The variance of the mean is that of resamples of the tosses and that of the engines; Student's t has the degrees of freedom of both.
     """
     column = list(FIRST_GRID).index(parameter)
-    values = np.array([finer.value[column] for _, finer in fitted.values()])
-    resampled = np.mean([0.5 * (finer.lower + finer.upper)[:, column] for _, finer in fitted.values()], axis=0)
+    values = np.array([profile.value[column] for profile in fitted.values()])
+    resampled = np.mean([0.5 * (profile.lower + profile.upper)[:, column] for profile in fitted.values()], axis=0)
     variances = np.array([resampled.var() * size / (size - 1), values.var(ddof=1) / len(values)])
     freedom = variances.sum() ** 2 / np.sum(variances**2 / [size - 1, len(values) - 1])
     half = float(stdtrit(freedom, 0.5 * (1.0 + LEVEL)) * np.sqrt(variances.sum()))

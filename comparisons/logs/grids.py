@@ -67,14 +67,19 @@ class Profile(NamedTuple):
     Attributes:
         lower: The least values that are as good as the best, by resample and parameter, shape (RESAMPLES, 2).
         upper: The largest ones.
-        value: The estimate from the tosses themselves, shape (2,).
+        best: The least and the largest from the tosses themselves, shape (2, 2).
         discrepancy: δ [m].
     """
 
     lower: Array
     upper: Array
-    value: Array
+    best: Array
     discrepancy: float
+
+    @property
+    def value(self) -> Array:
+        """The estimates from the tosses themselves, shape (2,)."""
+        return np.asarray(self.best.mean(axis=0))
 
 
 def problem_of(flights: Flights, frames: int, steps: int) -> Problem:
@@ -149,7 +154,7 @@ def _losses(residuals: Array, derivatives: Array, variances: Array, axes: tuple[
 
 
 def _best(losses: Array, axes: tuple[Array, ...], counts: Array) -> tuple[Array, Array, Array]:
-    """The least and the largest of the best parameters in resamples, shapes (RESAMPLES, 2), and those from the tosses themselves, (2,)."""
+    """The least and the largest of the best parameters in resamples, shapes (RESAMPLES, 2), and from the tosses themselves, (2, 2)."""
     lower, upper = np.empty((2, len(counts) + 1, 2))
     sums = np.tensordot(np.vstack([counts, np.ones(counts.shape[1])]), losses, axes=(1, 2))
     for column, axis in enumerate(axes):
@@ -157,7 +162,7 @@ def _best(losses: Array, axes: tuple[Array, ...], counts: Array) -> tuple[Array,
         good = least <= least.min(axis=1, keepdims=True) + TIE
         lower[:, column] = values[np.argmax(good, axis=1)]
         upper[:, column] = values[len(values) - 1 - np.argmax(good[:, ::-1], axis=1)]
-    return lower[:-1], upper[:-1], 0.5 * (lower[-1] + upper[-1])
+    return lower[:-1], upper[:-1], np.stack([lower[-1], upper[-1]])
 
 
 def _interpolation(axis: Array) -> tuple[Array, Array]:

@@ -1,6 +1,7 @@
 """How often intervals of friction and restitution hold for synthetic tosses: part of `make coverage`, prints the table of docs/measured.md.
 
-An engine makes the tosses, with .2 mm and 2 mrad of white noise at 148 Hz; it and another engine are fitted to them.
+An engine makes the tosses, with .2 mm and 2 mrad of white noise at 148 Hz; it and another engine are fitted to them. Arguments
+are the number of recordings of each size and the sizes: of the table, 40 10 20.
 """
 
 import math
@@ -34,9 +35,10 @@ def outcome(count, number):
 
 def main():
     rows = [HEAD, ["---"] * len(HEAD)]
+    recordings, *counts = map(int, sys.argv[1:] or (RECORDINGS, *COUNTS))
     with ProcessPoolExecutor() as pool:
-        for count in COUNTS:
-            shares = np.nanmean(list(pool.map(outcome, [count] * RECORDINGS, range(RECORDINGS))), axis=0)
+        for count in counts:
+            shares = np.nanmean(list(pool.map(outcome, [count] * recordings, range(recordings))), axis=0)
             rows.append([str(count), *(f"{100.0 * share:.1f} %" for share in shares)])
     sys.stdout.writelines(f"| {' | '.join(cells)} |\n" for cells in rows)
 

@@ -1,7 +1,7 @@
 """How often intervals of friction and restitution hold for synthetic tosses: part of `make coverage`, prints the table of docs/measured.md.
 
 An engine makes the tosses, with .2 mm and 2 mrad of white noise at 148 Hz; it and another engine are fitted to them. Arguments
-are the number of recordings of each size and the sizes: of the table, 40 10 20.
+are the number of recordings of each size and the sizes: of the table, 30 10 20.
 """
 
 import math

@@ -35,7 +35,7 @@ REMAINDER = 0.25
 """Of the difference between the two steps, what the extrapolation may leave: with 200 synthetic tosses of a box, 0.0002 of 0.0008. However
 many the tosses, their resamples do not show it.
 """
-Steps = tuple[Profile, Array]
+Extrapolated = tuple[Profile, Array]
 """The estimates of an engine at a time step of 0, and what may be left of the effect of the step, shape (2,)."""
 EQUAL = 0.02
 """Difference of a parameter between engines that may be neglected: in a restitution of 0.4, it changes a rebound's height by a tenth."""
@@ -146,7 +146,7 @@ def log_fit(
     estimates: list[Estimate] = []
     transfers: list[Transfer] = []
     for parameter in FIRST_GRID:
-        of_each = {label: _estimate(label, parameter, steps, size) for label, steps in fitted.items()}
+        of_each = {label: _estimate(label, parameter, found, size) for label, found in fitted.items()}
         identified = {label: fitted[label] for label, one in of_each.items() if one.has_lower or one.has_upper}
         bounded = {label: fitted[label] for label, one in of_each.items() if one.has_lower and one.has_upper}
         estimates += of_each.values()
@@ -161,7 +161,7 @@ def log_fit(
 
 def _profile(
     problems: Sequence[Problem], entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]
-) -> Steps | Breakdown:
+) -> Extrapolated | Breakdown:
     """The estimates of an engine at a time step of 0."""
     found = []
     for problem in problems:
@@ -172,7 +172,7 @@ def _profile(
     return _without_step(*found)
 
 
-def _without_step(coarser: Profile, finer: Profile) -> Steps:
+def _without_step(coarser: Profile, finer: Profile) -> Extrapolated:
     """The estimates extrapolated to a time step of 0, resample by resample.
 
     How late an impact is differs from toss to toss, evenly between 0 and a step, so that what the extrapolation leaves of it has no mean,
@@ -195,9 +195,9 @@ def _touches(problem: Problem) -> bool:
     return bool(heights(problem.header, poses[:, POSITION], poses[:, ORIENTATION]).min() < NEAR_FLOOR * problem.header.body.size)
 
 
-def _estimate(label: str, parameter: str, steps: Steps, size: int) -> Estimate:
+def _estimate(label: str, parameter: str, found: Extrapolated, size: int) -> Estimate:
     """A parameter of an engine, from the tosses and their resamples; its interval contains what may be left of the effect of the step."""
-    tried, column, (profile, remainder) = FIRST_GRID[parameter], list(FIRST_GRID).index(parameter), steps
+    tried, column, (profile, remainder) = FIRST_GRID[parameter], list(FIRST_GRID).index(parameter), found
     lower, upper = expanded(profile.lower[:, column], profile.upper[:, column], size)
     has_lower, has_upper = bool(lower > tried[0]), bool(upper < tried[-1])
     left = abs(float(remainder[column])) if has_lower and has_upper else 0.0
@@ -205,7 +205,7 @@ def _estimate(label: str, parameter: str, steps: Steps, size: int) -> Estimate:
     return Estimate(label, parameter, float(profile.value[column]), lower, upper, has_lower, has_upper)
 
 
-def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Steps], size: int, *, are_bounded: bool) -> Transfer:
+def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Extrapolated], size: int, *, are_bounded: bool) -> Transfer:
     """The difference of a parameter between two engines, resample by resample, at both ends of the values that are as good as the best.
 
     Estimates that are bounded on one side alone may be shown to differ, but not to be equal.
@@ -222,7 +222,7 @@ def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Step
     return Transfer(parameter, first, second, float(one.value[column] - other.value[column]), lower, upper, verdict)
 
 
-def _of_all(parameter: str, fitted: Mapping[str, Steps], size: int) -> Estimate:
+def _of_all(parameter: str, fitted: Mapping[str, Extrapolated], size: int) -> Estimate:
     """A parameter whichever engine continues the tosses, as the mean over engines that differ at random.
 
     The variance of the mean is that of resamples of the tosses and that of the engines; Student's t has the degrees of freedom of both.

@@ -57,10 +57,11 @@ class ProgramSimulation(Simulation):
         with ExitStack() as opened:
             self._errors = opened.enter_context(TemporaryFile())
             try:
-                self._process = opened.enter_context(Popen(command, stdin=PIPE, stdout=PIPE, stderr=self._errors, text=True))
+                self._process = opened.enter_context(Popen(command, bufsize=0, stdin=PIPE, stdout=PIPE, stderr=self._errors))
             except OSError as error:
                 raise RuntimeError(f"{command[0]!r} cannot be started: {error.strerror}; `program` is {list(command)}") from None
             opened.callback(self._process.kill)
+            self._unread = b""
             self._state = self._ask("start", "\n".join(scene_lines(scene, dt)), PATIENCE)
             self._opened = opened.pop_all()
 
@@ -77,24 +78,35 @@ class ProgramSimulation(Simulation):
 
     def _ask(self, asked: str, lines: str, patience: float) -> Array:
         """The state that the program answers with, within a wall time [s], shape (13,)."""
-        requests, answers, answer = self._process.stdin, self._process.stdout, ""
+        requests = self._process.stdin
         assert requests is not None
-        assert answers is not None
-        with suppress(BrokenPipeError):  # the program ended, which the empty answer says
-            requests.write(f"{lines}\n")
-            requests.flush()
-            if not select([answers], [], [], patience)[0]:
+        self._unread += self._written(0.0) or b""
+        if self._unread:  # which would be taken for the answer to this request
+            raise RuntimeError(f"the program wrote {shown(self._unread.decode(errors='replace'))} before {asked!r}; an answer is one line")
+        with suppress(BrokenPipeError):  # the program ended, so that there is no answer
+            requests.write(f"{lines}\n".encode())
+        while b"\n" not in self._unread:
+            written = self._written(patience)
+            if written is None:
                 raise RuntimeError(f"the program did not answer {asked!r} within {patience:g} s; does it flush its output?")
-            answer = answers.readline()
-        if not answer:
-            raise RuntimeError(f"the program ended with {self._end()} instead of answering {asked!r}")
+            if not written:
+                raise RuntimeError(f"the program ended with {self._end()} instead of answering {asked!r}")
+            self._unread += written
+        line, _, self._unread = self._unread.partition(b"\n")
+        answer = line.decode(errors="replace").rstrip()
         try:
             numbers = np.array([float(word) for word in answer.split()])
         except ValueError:
             numbers = np.empty(0)
         if numbers.shape != (13,):
-            raise RuntimeError(f"the program answered {asked!r} with {shown(answer.rstrip())}; a state is a line of 13 numbers")
+            raise RuntimeError(f"the program answered {asked!r} with {shown(answer)}; a state is a line of 13 numbers")
         return numbers
+
+    def _written(self, patience: float) -> bytes | None:
+        """What the program has written and is not read yet, within a wall time [s]: None if nothing, empty if it ended."""
+        answers = self._process.stdout
+        assert answers is not None
+        return answers.read(1 << 16) if select([answers], [], [], patience)[0] else None
 
     def _end(self) -> str:
         """How the program ended, and the last line of its standard error."""

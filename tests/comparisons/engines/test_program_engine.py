@@ -72,6 +72,7 @@ def python(answer):
         (python("print('hello')"), "crashed", "the program answered 'start' with 'hello'; a state is a line of 13 numbers"),
         (python("print(line[6:].strip() if word == 'start' else '1 2 3')"), "crashed", "the program answered 'advance 1' with '1 2 3'"),
         (python("print(line[6:].strip() if word == 'start' else 'nan ' * 13)"), "diverged", "the state is not finite"),
+        (python("sys.stdout.write(line[6:] + '2\\n')"), "crashed", r"the program wrote '2\\n' before 'advance 1'; an answer is one line"),
         (python(f"print('{STATE}')"), "crashed", "velocity at the start is"),
         (program("absent-solver"), "crashed", "'absent-solver' cannot be started: No such file or directory"),
     ],
@@ -81,6 +82,13 @@ def test_program_that_breaks_costs_its_row(engine, verdict, reason):
     found = recorded if isinstance(recorded, Breakdown) else divergence(recorded.motion)
     assert found.verdict == verdict
     assert re.search(reason, found.reason), found.reason
+
+
+def test_program_that_ends_between_requests_says_how():
+    with python("sys.stdout.write(line[6:]); sys.exit(3)").prepare(SPIN, 0.01) as simulation:
+        simulation._process.wait()
+        with pytest.raises(RuntimeError, match="ended with exit code 3 instead of answering 'advance 1'"):
+            simulation.advance(1)
 
 
 def test_program_that_does_not_answer_is_ended(monkeypatch):

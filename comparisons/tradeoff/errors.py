@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
@@ -56,6 +57,7 @@ class Ladder:
         ended: The kind of reason why no smaller time step was tried.
         reason: The reason why no smaller time step was tried, as a clause.
         left_out: The reason why the engine is left out of the comparison; empty if it is compared.
+        verdict: The verdict on the engine if it broke down, declines the scene or is not installed; otherwise None.
     """
 
     engine: str
@@ -63,6 +65,7 @@ class Ladder:
     ended: Ending
     reason: str
     left_out: str = ""
+    verdict: Verdict | None = None
 
     @property
     def completed(self) -> tuple[tuple[float, float], ...]:
@@ -99,16 +102,17 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
     most = MOST_STEPS if scene.floor is None else MOST_RECORDED
     tried: list[tuple[float, list[float]]] = []
     spent = 0.0
+    verdict: Verdict | None = None
     ended: Ending = "longest_run"
     reason = f"a run at the next smaller time step would have more than {most:,} steps"
     run = processes.call(entry, _errors, scene, interval, 1, metrics)  # compiles and warms up before anything is timed
     if isinstance(run, Breakdown):
-        return Ladder(entry.label, (), "not_run", run.reason, run.reason)
+        return Ladder(entry.label, (), "not_run", run.reason, run.reason, run.verdict)
     for division in takewhile(lambda division: scene.duration * division / interval <= most, DIVISIONS):
         run = processes.call(entry, _errors, scene, interval / division, division, metrics)
         if isinstance(run, Breakdown):
             tried.append((interval / division, [math.nan] * len(metrics)))
-            ended, reason = "failed", run.reason
+            ended, reason, verdict = "failed", run.reason, run.verdict
             break
         tried.append((interval / division, run[0]))
         spent += run[1]
@@ -119,7 +123,7 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
             ended, reason = "budget", f"the budget of {budget:g} s of processor time was spent"
             break
     steps = tuple((dt, errors[0]) for dt, errors in tried)
-    return Ladder(entry.label, steps, ended, reason, _left_out(scene, tried, metrics[1], reason))
+    return Ladder(entry.label, steps, ended, reason, _left_out(scene, tried, metrics[1], reason), verdict)
 
 
 def _stalled(errors: Sequence[float]) -> int:

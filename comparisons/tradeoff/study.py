@@ -48,7 +48,15 @@ OnProgress = Callable[[str, float], None]
 
 
 class NotCompared(DropspinError):
-    """No engine can be compared in a scene; the message has the reason of each."""
+    """No engine can be compared in a scene; the message has the reason of each.
+
+    Attributes:
+        ladders: The time steps tried for every requested engine.
+    """
+
+    def __init__(self, text: str, ladders: Sequence[Ladder]) -> None:
+        super().__init__(text)
+        self.ladders = ladders
 
 
 def tradeoff(
@@ -117,11 +125,12 @@ def tradeoff(
         points, others = _with_costs(compared, scene, sizes, processes, report)
         memory = _memory(entries, points, scene, sizes[-1], processes)
     measured = {point.engine for point in points}
-    ladders = [ladder if ladder.left_out or ladder.engine in measured else replace(ladder, left_out=NO_COST) for ladder in ladders]
+    without = {ladder.engine for ladder in ladders if not ladder.left_out} - measured
+    ladders = [replace(ladder, left_out=NO_COST, verdict="crashed") if ladder.engine in without else ladder for ladder in ladders]
     result = TradeOff(scene, chosen, points, tuple(ladders), sizes, memory, others)
     if not points:
         reasons = "; ".join(f"{label}: {why.removesuffix('.')}" for label, why in result.left_out.items())
-        raise NotCompared(f"no engine can be compared in {scene.name}: {reasons}.")
+        raise NotCompared(f"no engine can be compared in {scene.name}: {reasons}.", ladders)
     return result
 
 

@@ -43,25 +43,33 @@ from dropspin.reports.commands.options import (
 @jobs_option("engines whose errors are measured")
 @output_option("out/tradeoff", "for the table and the plots")
 @as_json
-def tradeoff_command(scenes: tuple[str, ...], within: tuple[float, ...], output: str, json_output: bool, **options: Any) -> None:
+def tradeoff_command(scenes: tuple[str, ...], within: tuple[float, ...], output: str, json_output: bool, **options: Any) -> int:
     """Measure what accuracy costs: the error and the computing time at many time steps, and the cheapest configuration within a tolerance.
 
     The default is the scene spin-asymmetric, with engines and methods that give different results for it.
+
+    Exit code: 0 whatever is measured, 2 bad input, 3 an engine broke down, or one that was named is missing.
     """
+    from dropspin.comparisons.engines.base import EngineBroken
     from dropspin.comparisons.tradeoff.study import NotCompared, tradeoff
-    from dropspin.reports.stories.tradeoff import TradeOffs
+    from dropspin.reports.stories.tradeoff import TradeOffs, exit_code
     from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.scenarios import load
 
     loaded, results = list(map(load, scenes or ("spin-asymmetric",))), []
+    ladders: list[Any] = []
+    named = bool(options["engines"])
     with written_study(output, json_output) as keep:
         for scene in loaded:
             try:
                 with share_bar(scene.name) as on_progress:
                     results.append(tradeoff(scene, **options, on_progress=on_progress))
+                ladders += results[-1].ladders
             except NotCompared as error:
+                ladders += error.ladders
                 if scene is loaded[-1] and not results:
-                    raise
+                    raise EngineBroken(str(error)) if exit_code(ladders, named=named) else error from None
                 click.echo(f"left out: {error}", err=True)
         keep(TradeOffs(scenes=results, within=within))
+    return exit_code(ladders, named=named)

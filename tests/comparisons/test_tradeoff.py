@@ -383,6 +383,7 @@ def test_engine_whose_cost_cannot_be_measured_is_left_out_with_the_reason():
     found = tradeoff(SHORT, [NoCost(), "wang[rotation=exact]"])
     assert list(found.left_out) == ["no-cost"]
     assert "cost could not be measured" in found.left_out["no-cost"]
+    assert [ladder.verdict for ladder in found.ladders] == ["crashed", None]
     with pytest.raises(DropspinError, match="no engine can be compared in spin-asymmetric: no-cost: its cost could not be measured"):
         tradeoff(SHORT, [NoCost()])
 

@@ -5,8 +5,9 @@ import json
 import pytest
 from support.cli import dropspin
 
-from dropspin.comparisons.tradeoff.errors import BUDGET
+from dropspin.comparisons.tradeoff.errors import BUDGET, Ladder
 from dropspin.reports.commands.tradeoff import tradeoff_command
+from dropspin.reports.stories.tradeoff import exit_code
 from dropspin.reports.study_files import read_study
 
 pytestmark = pytest.mark.usefixtures("two_rounds")
@@ -113,3 +114,37 @@ def test_each_number_of_worlds_has_a_cost_and_a_recommendation(tmp_path):
         assert costs == [None, None] if row["engine"] == "pybullet" else all(cost > 0.0 for cost in costs)
     [picture] = [part for part in read_study(str(tmp_path / "out")).parts if part.kind == "charts"]
     assert picture.charts[-1].x_label == "number of worlds in a batch"
+
+
+BROKEN = """
+import dropspin as ds
+
+class Broken(ds.Engine):
+    name = "broken"
+    def prepare(self, scene, dt):
+        raise RuntimeError("no licence")
+"""
+
+
+def test_engine_that_breaks_down_or_is_missing_costs_its_rows_and_the_exit_code(tmp_path):
+    """The others are written; if there are none, the code is not that of bad usage."""
+    (tmp_path / "short.toml").write_text(SCENE)
+    (tmp_path / "broken_engine.py").write_text(BROKEN)
+    asked = ("tradeoff", "short.toml", "--budget", "1e-9", "-e", "broken_engine:Broken", "-o", "out")
+    alone = dropspin(*asked, cwd=tmp_path)
+    assert (alone.returncode, "broken: RuntimeError: no licence." in alone.stderr) == (3, True)
+    assert not (tmp_path / "out").exists()
+    beside = dropspin(*asked, "-e", "wang[rotation=exact]", cwd=tmp_path)
+    assert beside.returncode == 3
+    assert "Left out: broken, RuntimeError: no licence." in " ".join(beside.stdout.split())
+    rows = json.loads((tmp_path / "out" / "tradeoff.json").read_text())
+    assert [(row["engine"], row["ladder_ended"]) for row in rows] == [("broken", "not_run"), ("wang[rotation=exact]", "budget")]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "named", "code"),
+    [("missing", True, 3), ("missing", False, 0), ("declined", True, 0), ("crashed", False, 3), (None, True, 0)],
+)
+def test_exit_code_is_that_of_the_worst_engine(verdict, named, code):
+    ladders = [Ladder("wang", (), "budget", ""), Ladder("other", (), "not_run", "", "", verdict)]
+    assert exit_code(ladders, named=named) == code

@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from dropspin.comparisons.running.cluster import connected
-from dropspin.comparisons.running.inputs import ignore
+from dropspin.comparisons.running.inputs import described_value, ignore
 from dropspin.comparisons.running.parallel import as_done, started_crews, work_in_parallel
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.resources import ONE_MINUTE, ResourceLimits
@@ -45,8 +45,12 @@ def run_sweep(
             raise an exception to stop the sweep.
 
     Raises:
-        DropspinError: The folder contains other files or another sweep, or is not writable.
+        DropspinError: The folder contains other files or another sweep, or is not writable, or `sweep` is not from `load_sweep`.
     """
+    if not isinstance(sweep, Sweep):
+        raise DropspinError(
+            f"sweep: got {described_value(sweep)}; give the result of dropspin.load_sweep, which takes a file or a mapping."
+        )
     work = Work.of(sweep, resources)
     folder = SweepFolder(where, work.identity, work.part_size)
     earlier, present = folder.description(), folder.parts()

@@ -15,7 +15,7 @@ import numpy as np
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.metrics import leading_metric, metrics_for
 from dropspin.comparisons.running.entries import engine_entries
-from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore
+from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, described_value, ignore
 from dropspin.comparisons.running.parallel import as_jobs, results_in_parallel
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown
@@ -94,11 +94,12 @@ def tradeoff(
         DropspinError: The scene has no exact solution, the metric does not apply to it, the budget or a number of worlds is not above 0, or
             no engine can be compared in the scene (the subclass NotCompared).
     """
-    sizes = tuple(sorted(set(worlds)))
-    if not all(isinstance(size, int) and 0 < size <= MOST_WORLDS for size in sizes):
-        raise DropspinError(f"worlds: got {', '.join(map(str, worlds))}; give whole numbers from 1 to {MOST_WORLDS}.")
-    if not 0.0 < budget < math.inf:
-        raise DropspinError(f"budget: got {budget!r}; give a number of seconds above 0.")
+    given = list(worlds) if isinstance(worlds, Iterable) else []
+    if not given or not all(isinstance(size, int) and 0 < size <= MOST_WORLDS for size in given):
+        raise DropspinError(f"worlds: got {described_value(worlds)}; give a list of whole numbers from 1 to {MOST_WORLDS}.")
+    sizes = tuple(sorted(set(given)))
+    if not (isinstance(budget, int | float | np.floating) and 0.0 < budget < math.inf):
+        raise DropspinError(f"budget: got {described_value(budget)}; give a number of seconds above 0.")
     scene = as_scene(scene)
     truth = truth_for(scene)
     if truth is None:

@@ -388,10 +388,16 @@ def test_engine_whose_cost_cannot_be_measured_is_left_out_with_the_reason():
         tradeoff(SHORT, [NoCost()])
 
 
-@pytest.mark.parametrize("budget", [0.0, -1.0, np.nan, np.inf])
+@pytest.mark.parametrize("budget", [0.0, -1.0, np.nan, np.inf, "3", None])
 def test_budget_must_be_a_time_above_0(budget):
     with pytest.raises(DropspinError, match="budget: got"):
         tradeoff(SHORT, ["mujoco"], budget=budget)
+
+
+@pytest.mark.parametrize("worlds", [4, [], [0], [4.0], [4, "8"], "4", [[4]], None])
+def test_worlds_must_be_a_list_of_numbers(worlds):
+    with pytest.raises(DropspinError, match=r"worlds: got .* a list of whole numbers from 1 to 1048576"):
+        tradeoff(SHORT, ["mujoco"], worlds=worlds)
 
 
 def test_every_cost_is_a_positive_time(spin):

@@ -45,6 +45,12 @@ def assert_same(one, other):
     pd.testing.assert_frame_equal(table(one), table(other), check_exact=True)
 
 
+@pytest.mark.parametrize("spec", [SPEC, "sweep.toml", None])
+def test_spec_that_is_not_loaded_is_refused_with_the_remedy(spec, tmp_path):
+    with pytest.raises(DropspinError, match=r"sweep: got .*; give the result of dropspin.load_sweep"):
+        run_sweep(spec, str(tmp_path / "out"))
+
+
 class Breaking(test_engines.Exact):
     """Fails in another way at each restitution."""
 

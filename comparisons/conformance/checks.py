@@ -133,4 +133,6 @@ def run_check(entry: EngineEntry, check: str, folder: str | None = None) -> Chec
     except Diverged as diverged:
         return CheckResult(check, "failed", f"the engine diverged: {diverged}")
     except Exception as error:  # an adapter is somebody else's code
+        if wrong := protocol.wrong_answer(entry.adapter):
+            return CheckResult(check, "failed", wrong, whole_traceback(error))
         return CheckResult(check, "crashed", described(error, entry.adapter), whole_traceback(error))

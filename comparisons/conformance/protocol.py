@@ -15,15 +15,17 @@ import numpy as np
 from dropspin.comparisons.conformance.motions import explain_start
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted, described
 from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, FLIGHTS, PROBES, accepted_scene, recorded, state_after
-from dropspin.comparisons.engines.base import Diverged, Engine
+from dropspin.comparisons.engines.base import Diverged, Engine, Simulation
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.verification import (
     MULTIPLE,
     BuildMismatch,
     verified_claims,
+    verified_lag,
     verified_record,
     verified_refusal,
     verified_settings,
+    verified_simulation,
     verify_build,
     verify_start,
 )
@@ -92,11 +94,8 @@ def _verify_built(engine: Engine, scene: Scenario) -> bool:
     """Verify what an engine built of a scene; whether it reads back mass, inertia and gravity."""
     arrays = {name: getattr(scene.body, name) for name in ("inertia_tensor", "vertices", "centre")}
     before = {name: values.copy() for name, values in arrays.items()}
-    with engine.prepare(scene, DT) as simulation:
-        state = simulation.state()
-        if not (isinstance(state, np.ndarray) and state.shape == (13,) and state.dtype.kind in "fiu"):
-            kind = f"an array of {state.dtype}, shape {state.shape}" if isinstance(state, np.ndarray) else f"a {type(state).__name__}"
-            raise CheckFailed(f"state() returns {kind}; it must return a NumPy array of 13 real numbers, shape (13,)")
+    with verified_simulation(engine.prepare(scene, DT)) as simulation:
+        state = _verified_state(simulation)
         if not np.isfinite(state).all():
             raise CheckFailed(f"the state at the start is not finite: {state.tolist()}")
         try:
@@ -110,6 +109,27 @@ def _verify_built(engine: Engine, scene: Scenario) -> bool:
     if written:
         raise CheckFailed(f"the adapter writes into scene.body.{written[0]}, which everything else uses too; change a copy of it")
     return has_built
+
+
+def _verified_state(simulation: Simulation) -> Array:
+    state = simulation.state()
+    if not (isinstance(state, np.ndarray) and state.shape == (13,) and state.dtype.kind in "fiu"):
+        kind = f"an array of {state.dtype}, shape {state.shape}" if isinstance(state, np.ndarray) else f"a {type(state).__name__}"
+        raise CheckFailed(f"state() returns {kind}; it must return a NumPy array of 13 real numbers, shape (13,)")
+    return state
+
+
+def wrong_answer(engine: Engine) -> str:
+    """What `prepare`, `state` or `velocity_lag` is instead of what it must be, with which no check can run; empty if nothing is wrong."""
+    try:
+        with verified_simulation(engine.prepare(accepted_scene(engine), DT)) as simulation:
+            _verified_state(simulation)
+            verified_lag(simulation.velocity_lag, DT)
+    except (CheckFailed, BuildMismatch) as wrong:
+        return str(wrong)
+    except Exception:  # an adapter is somebody else's code
+        pass
+    return ""
 
 
 def _start_explained(engine: Engine, scene: Scenario, state: Array) -> str:

@@ -22,6 +22,7 @@ from dropspin.comparisons.running.verification import (
     verified_record,
     verified_refusal,
     verified_settings,
+    verified_simulation,
     verify_build,
     verify_starts,
 )
@@ -101,7 +102,7 @@ def record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_
         Diverged: The simulation diverged.
     """
     steps = scene.steps(dt)
-    with engine.prepare(scene, dt) as simulation:
+    with verified_simulation(engine.prepare(scene, dt)) as simulation:
         if verify:
             verify_build(engine, scene, simulation, dt)
         settings = verified_settings(simulation.settings)

@@ -32,6 +32,17 @@ class BuildMismatch(Exception):
     """An engine simulates something else than the scene; the text says what."""
 
 
+def verified_simulation(prepared: Any) -> Simulation:
+    """What `prepare` returns.
+
+    Raises:
+        BuildMismatch: It is not a simulation.
+    """
+    if not isinstance(prepared, Simulation):
+        raise BuildMismatch(f"prepare() returns {shown(prepared)}; it must return a dropspin.Simulation")
+    return prepared
+
+
 def verify_build(engine: Engine, scene: Scenario, simulation: Simulation, dt: float) -> None:
     """Raise `BuildMismatch` unless state, mass, inertia and gravity equal the scene's to 8 eps, a spin to 64, of the engine's precision."""
     verified_lag(simulation.velocity_lag, dt)

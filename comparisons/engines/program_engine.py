@@ -37,6 +37,8 @@ class ProgramEngine(Engine):
     """
 
     program: ClassVar[Sequence[str]]
+    lag: ClassVar[float] = 0.5
+    """The time by which velocity lags position, in time steps: half a step under semi-implicit Euler, as in Algorithm 1."""
     shapes, takes_offsets = ("sphere", "box", "capsule", "vertices", "mesh"), True
 
     def declines(self, scene: Scenario) -> str | None:
@@ -44,14 +46,15 @@ class ProgramEngine(Engine):
 
     def prepare(self, scene: Scenario, dt: float) -> "ProgramSimulation":
         folder = Path(inspect.getfile(type(self))).resolve().parent
-        return ProgramSimulation(scene, dt, [str(folder / part) if (folder / part).is_file() else part for part in self.program])
+        command = [str(folder / part) if (folder / part).is_file() else part for part in self.program]
+        return ProgramSimulation(scene, dt, command, self.lag * dt)
 
 
 class ProgramSimulation(Simulation):
     """A process of the program, for one scene."""
 
-    def __init__(self, scene: Scenario, dt: float, command: Sequence[str]) -> None:
-        self.velocity_lag = 0.5 * dt  # semi-implicit Euler, as in Algorithm 1
+    def __init__(self, scene: Scenario, dt: float, command: Sequence[str], velocity_lag: float) -> None:
+        self.velocity_lag = velocity_lag
         files = [Path(part).read_bytes() for part in command if Path(part).is_file()]
         self.settings = {"program": " ".join(command), "version": hashlib.sha256(b"".join(files)).hexdigest()[:12]}
         with ExitStack() as opened:

@@ -98,6 +98,14 @@ def test_program_that_does_not_answer_is_ended(monkeypatch):
     assert found.reason == "RuntimeError: the program did not answer 'start' within 1 s; does it flush its output?"
 
 
+@pytest.mark.parametrize("stated", [{}, {"lag": 0.0}])
+def test_lag_of_a_program_is_what_its_class_states(stated):
+    """By default that of Algorithm 1."""
+    engine = type("Stating", (type(python("print(line[6:].strip())")),), stated)()
+    with engine.prepare(SPIN, 0.01) as simulation:
+        assert simulation.velocity_lag == stated.get("lag", 0.5) * 0.01
+
+
 def test_slow_program_is_waited_for(monkeypatch):
     """An interpreted program that takes 30 ms a step, and most of a second for all of them."""
     monkeypatch.setattr(program_engine, "PATIENCE", 0.2)

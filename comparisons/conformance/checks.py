@@ -12,9 +12,9 @@ from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.engines.base import Diverged, Engine
 from dropspin.comparisons.running.entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
+from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown
-from dropspin.comparisons.running.resources import ONE_MINUTE, ResourceLimits
 from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.state import Array
 

@@ -37,9 +37,9 @@ from dropspin.comparisons.logs.replay import (
 )
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown
-from dropspin.comparisons.running.resources import FIVE_MINUTES, ResourceLimits
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.variations import with_values

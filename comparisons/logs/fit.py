@@ -18,9 +18,9 @@ from dropspin.comparisons.logs.log import Log
 from dropspin.comparisons.logs.replay import flights_in, of_each_engine
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown
-from dropspin.comparisons.running.resources import FIVE_MINUTES, ResourceLimits
 from dropspin.scenarios.state import ORIENTATION, POSITION, Array
 
 ANY_ENGINE = "any engine"

@@ -19,8 +19,8 @@ from dropspin.comparisons.running.ablation import explaining
 from dropspin.comparisons.running.engine_study import EngineStudy
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import ignore
+from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.resources import ResourceLimits
 from dropspin.comparisons.running.start_phases import StartPhase
 from dropspin.scenarios import truth_for
 

@@ -20,8 +20,8 @@ from dropspin.comparisons.robustness.runner import MOST_STEPS_PER_START, Runner
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry, SceneLike, as_scene, ignore, verify_time_step
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
+from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.resources import ONE_MINUTE, ResourceLimits
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.errors import verify_known
 

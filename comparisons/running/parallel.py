@@ -8,8 +8,8 @@ from typing import TypeVar
 
 from dropspin.comparisons.results.interrupts import finished, interrupts_deferred
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
+from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import Closed, EngineProcesses
-from dropspin.comparisons.running.resources import ResourceLimits
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import DropspinError
 

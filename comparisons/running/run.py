@@ -18,9 +18,9 @@ from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.forecast import Forecast, forecast
 from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, as_scenes, ignore, several, verify_time_step
 from dropspin.comparisons.running.parallel import started_crews, work_in_parallel
+from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress
-from dropspin.comparisons.running.resources import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.scene_run import run_scene
 from dropspin.comparisons.running.start_phases import StartPhase
 from dropspin.comparisons.running.timing import time_engines

@@ -12,8 +12,8 @@ from typing import Any
 from dropspin.comparisons.running.cluster import connected
 from dropspin.comparisons.running.inputs import described_value, ignore
 from dropspin.comparisons.running.parallel import as_done, started_crews, work_in_parallel
+from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.resources import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.sweeps.folder import SweepFolder
 from dropspin.comparisons.sweeps.jobs import Sweep
 from dropspin.comparisons.sweeps.work import Work, installed_versions

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from dropspin.comparisons.running.resources import ResourceLimits
+    from dropspin.comparisons.running.process_limits import ResourceLimits
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -94,7 +94,7 @@ def time_limit_option(of: str, default: float = ONE_MINUTE) -> Callable[[Command
 
 
 def _resources(context: click.Context, parameter: click.Parameter, seconds: float) -> "ResourceLimits":
-    from dropspin.comparisons.running.resources import ResourceLimits
+    from dropspin.comparisons.running.process_limits import ResourceLimits
 
     return ResourceLimits(processor_time=seconds)
 

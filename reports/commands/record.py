@@ -10,7 +10,7 @@ from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo
 
 if TYPE_CHECKING:
-    from dropspin.comparisons.running.resources import ResourceLimits
+    from dropspin.comparisons.running.process_limits import ResourceLimits
 
 
 @click.command("record")

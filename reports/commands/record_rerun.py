@@ -7,7 +7,7 @@ import click
 from dropspin.reports.commands.options import as_json, time_limit_option
 
 if TYPE_CHECKING:
-    from dropspin.comparisons.running.resources import ResourceLimits
+    from dropspin.comparisons.running.process_limits import ResourceLimits
 
 
 @click.command("rerun")

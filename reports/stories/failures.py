@@ -11,7 +11,7 @@ from dropspin.comparisons.judging.verdicts import FAILURES
 from dropspin.comparisons.measuring.symmetries import kind_of
 from dropspin.comparisons.regressions.causes import WrongParameter, causes
 from dropspin.comparisons.results.results import Results
-from dropspin.comparisons.running.resources import ResourceLimits
+from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.reports.document import Paragraph, Part, Sentences
 from dropspin.reports.stories.numbers import Row, bound, explained_by, formatted, grouped, in_ms, listed, step, subject, word
 from dropspin.scenarios.text import counted, rounded

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from dropspin.comparisons.running.resources import ResourceLimits
+from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.scenarios import load
 from support.engines import Exact
 

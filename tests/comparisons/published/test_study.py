@@ -12,7 +12,7 @@ from dropspin.comparisons.published import formulas, study
 from dropspin.comparisons.published.formulas import FORMULAS, kane, nesc_brick
 from dropspin.comparisons.published.quantities import quantity
 from dropspin.comparisons.published.sources import DATA, source_names, sources
-from dropspin.comparisons.running.resources import ResourceLimits
+from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.reports.stories.reproduce import exit_code
 from dropspin.scenarios import Trajectory, UnknownName
 

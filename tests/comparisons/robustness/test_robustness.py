@@ -19,8 +19,8 @@ from dropspin.comparisons.robustness.operating_point import OperatingPoint, in_n
 from dropspin.comparisons.robustness.runner import Runner
 from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, ScanPoint, find_limits, scan_axis
 from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.resources import ResourceLimits
 from dropspin.scenarios import DropspinError, Trajectory, load, truth_for
 from dropspin.scenarios.surfaces import Floor
 

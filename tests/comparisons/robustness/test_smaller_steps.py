@@ -5,7 +5,7 @@ import pytest
 from support.engines import Crashing, Declining, Exact, ExactSimulation, Frozen, turned_by
 
 from dropspin.comparisons.robustness.study import find_limits
-from dropspin.comparisons.running.resources import ResourceLimits
+from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.scenarios import load
 
 QUICK = ResourceLimits(processor_time=20.0)

@@ -10,7 +10,7 @@ import pytest
 from support.adapters import DRIFTING
 
 import dropspin as ds
-from dropspin.comparisons.running.resources import ResourceLimits
+from dropspin.comparisons.running.process_limits import ResourceLimits
 
 DRIFT = {"name": "drift", "duration": 0.1, "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0}, "start": {"velocity": [1.0, 0.0, 0.0]}}
 LIMITS = ResourceLimits(processor_time=1.0, memory=2**30)

@@ -8,8 +8,8 @@ from dropspin.comparisons.running.engine_study import EngineStudy
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.forecast import MEASURING, Forecast, forecast, simulations
 from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.process_limits import FIVE_MINUTES
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.resources import FIVE_MINUTES
 from dropspin.comparisons.running.start_phases import StartPhase, phases_at
 from dropspin.comparisons.running.timing import Timing
 from dropspin.reports.stories.run import forecast_sentence

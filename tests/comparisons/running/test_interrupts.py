@@ -16,7 +16,7 @@ from concurrent.futures import _base
 
 from dropspin.comparisons.running.parallel import work_in_parallel
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.resources import ResourceLimits
+from dropspin.comparisons.running.process_limits import ResourceLimits
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # which jobs in the background of a shell ignore
 take = _base._AcquireFutures.__enter__

@@ -12,8 +12,8 @@ import dropspin as ds
 from dropspin.comparisons.running.engine_run import EngineRun, motions_from
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import MOST_ROWS
+from dropspin.comparisons.running.process_limits import FIVE_MINUTES
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.resources import FIVE_MINUTES
 from dropspin.comparisons.running.start_phases import StartPhase, compare, measure
 
 BALL = ds.load("drop-ball")

@@ -19,8 +19,8 @@ from support.cli import dropspin
 
 import dropspin as ds
 from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.resources import ResourceLimits
 
 BALL, SPIN, TIGHT = breaking.BALL, breaking.SPIN, breaking.TIGHT
 TESTS = Path(__file__).parents[2]

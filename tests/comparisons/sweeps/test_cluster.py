@@ -18,7 +18,7 @@ import pytest
 
 from dropspin.comparisons.engines.base import EngineMissing
 from dropspin.comparisons.running import cluster as connection
-from dropspin.comparisons.running.resources import ResourceLimits
+from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.sweeps import running
 from dropspin.comparisons.sweeps.folder import read_sweep
 from dropspin.comparisons.sweeps.running import run_sweep

@@ -15,7 +15,7 @@ from support.cli import Started, dropspin, spawn
 
 import dropspin as ds
 from dropspin.comparisons.robustness import study
-from dropspin.comparisons.running.resources import FIVE_MINUTES, ONE_MINUTE
+from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ONE_MINUTE
 from dropspin.reports.commands import main as cli
 from dropspin.reports.commands.limits import limits_command
 from dropspin.reports.commands.run import run_command

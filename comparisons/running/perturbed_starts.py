@@ -23,7 +23,9 @@ SIGNS = (_FIRST, -_FIRST, _SECOND, -_SECOND)
 SETS_OF_STARTS = 2
 """Number of perturbations of many initial states at a time."""
 PERTURBED_PHASES = 8
-"""Start phases from which perturbed motions are simulated. The mean over a part of the phases changes at least as much as that over all."""
+"""Start phases from which perturbed motions are simulated. The mean over these changes as that over all phases if they change alike, and
+more if they change at random.
+"""
 
 
 def perturbed(scene: Scenario, starts: Sequence[Scenario], precision: type) -> list[list[Scenario]]:

@@ -2,7 +2,7 @@
 
 import html
 from collections import ChainMap
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -103,11 +103,6 @@ class Results:
         for part in parts.values():
             vars(part)["undecided"] = self.undecided[part.table.index]
         return parts
-
-    @property
-    def rows(self) -> list[dict[Hashable, Any]]:
-        """The rows of `table` as dictionaries, from which some are selected faster than by pandas if the run is of one scene."""
-        return self.table.to_dict("records")
 
     @cached_property
     def undecided(self) -> "pd.Series[bool]":

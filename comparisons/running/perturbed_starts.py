@@ -98,9 +98,10 @@ def changes_of_metrics(
     """
     if are_left_out(own, precision):
         return []
-    few, metrics = phases[:: _stride(len(phases))], metrics_for(own.scene, own.truth)
-    size, sets = len(few), perturbed(own.scene, [phase.scene for phase in few], precision)
-    before = {metric.name: metric.value_or_nan(cases[:: _stride(len(phases))]) for metric in metrics} if sets else {}
+    stride, metrics = _stride(len(phases)), metrics_for(own.scene, own.truth)
+    phases, cases = phases[::stride], cases[::stride]
+    size, sets = len(phases), perturbed(own.scene, [phase.scene for phase in phases], precision)
+    before = {metric.name: metric.value_or_nan(cases) for metric in metrics} if sets else {}
     at_once = max(1, MOST_ROWS // (size * own.scene.steps(dt)))
 
     def changes(first: int) -> Iterator[Mapping[str, float]]:
@@ -110,7 +111,7 @@ def changes_of_metrics(
         if isinstance(motions, Breakdown):
             raise motions
         for number in range(0, len(motions), size):
-            moved = compare(motions[number : number + size], few)
+            moved = compare(motions[number : number + size], phases)
             yield {metric.name: abs(metric.value_or_nan(moved) - before[metric.name]) for metric in metrics}
 
     return list(chain(*map(changes, range(0, len(sets), at_once))))

@@ -38,9 +38,8 @@ def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
         scene_name: The name of a scene of the run.
         metric: The name of a metric of this scene.
     """
-    expected = results.predictions[results.predictions["metric"] == metric].to_dict("records")
     shown, predictions = (
-        [row for row in rows if (row["scene"], row["metric"]) == (scene_name, metric)] for rows in (results.rows, expected)
+        rows[(rows["scene"] == scene_name) & (rows["metric"] == metric)].to_dict("records") for rows in (results.table, results.predictions)
     )
     values = sorted((row for row in shown if row["kind"] in ("truth", "invariant")), key=lambda row: row["dt"])
     rounding = TRUTH_ACCURACY * scale(results.scenes[scene_name], METRICS[metric].unit)

@@ -21,7 +21,7 @@ def error_budgets(results: Results) -> list[dict[Hashable, Any]]:
     Negligible errors that vanish as dt → 0 are left out. A row has the columns of the error, of its asymptotic error (names that end in
     `_of_limit`) and of its order (`_of_order`), which are NaN if undefined; the cause to which the error is attributed; and a sentence.
     """
-    rows = results.rows
+    rows = results.table.to_dict("records")
     errors = [row for row in rows if row["kind"] in ("truth", "invariant") and row["metric"] not in ARTEFACTS]
     limits, orders = ({_pair(row): row for row in rows if row["kind"] == kind} for kind in ("asymptotic_error", "order"))
     undecided, judged = {_pair(rows[n]) for n in np.flatnonzero(results.undecided)}, {engine for _, engine in limits}

@@ -28,7 +28,7 @@ from dropspin.reports.stories import numbers
 from dropspin.reports.stories.contacts import worst_contacts
 from dropspin.reports.stories.error_budget import error_budgets
 from dropspin.reports.stories.impact_laws import NOTE
-from dropspin.reports.stories.matrix import CHOICE, explanations, leading_errors, legend_of_marks, step_times
+from dropspin.reports.stories.matrix import CHOICE, explanations, legend_of_marks, step_times
 from dropspin.reports.stories.run import Overview
 from dropspin.reports.stories.scene import left_out, modelled
 from dropspin.scenarios import reference_for
@@ -59,7 +59,6 @@ def html_report(
         passed=summary.counts.failed == 0 and summary.counts.broken == 0,
         colours=engine_colours(results.engines),
         negligible=SMALLEST_STATED,
-        leading=leading_errors(results),
         steps=numbers.in_ms(float(finest[0])) if len(finest) == 1 else "",
         times=step_times(results),
         legend=legend_of_marks(summary.statuses),

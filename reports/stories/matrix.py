@@ -94,10 +94,9 @@ def leading_errors(results: Results) -> dict[str, Leading]:
     return found
 
 
-def matrix_of(results: Results, statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[dict[str, str]], list[str]]:
+def matrix_of(statuses: Mapping[str, Mapping[str, Status]], leading: Mapping[str, Leading]) -> tuple[list[dict[str, str]], list[str]]:
     """A row for each scene that a terminal shows, with the mark of the status and the leading error of each engine; and notes."""
-    scenes, left_out = shown_scenes(statuses)
-    leading, rows = leading_errors(results), []
+    rows, (scenes, left_out) = [], shown_scenes(statuses)
     steps = sorted({in_ms(errors.dt) for errors in leading.values()})
     title = f"error at dt = {' or '.join(steps)}" if steps else "error"
     for scene in scenes:

@@ -23,7 +23,7 @@ from dropspin.reports.stories.findings import (
     verdict_sentence,
 )
 from dropspin.reports.stories.impact_laws import NOTE, law_rows
-from dropspin.reports.stories.matrix import legend_of_marks, matrix_of
+from dropspin.reports.stories.matrix import Leading, leading_errors, legend_of_marks, matrix_of
 from dropspin.reports.stories.numbers import listed
 from dropspin.scenarios.text import counted
 
@@ -38,6 +38,7 @@ class Overview(NamedTuple):
         findings: The main finding on each engine.
         counts: The number of checks with each verdict.
         statuses: The status of each engine in each scene, by scene and engine.
+        leading: The leading error of each scene with an exact solution, by scene.
         profiles: Engines with default settings compared with the calibrated ones.
         failures: The failures; those of one result at several time steps count as one.
         tags: By property, such as Coulomb friction, the scenes that have it; the conclusion excepts scenes by these properties.
@@ -49,6 +50,7 @@ class Overview(NamedTuple):
     findings: Sequence[str]
     counts: Counts
     statuses: Mapping[str, Mapping[str, Status]]
+    leading: Mapping[str, Leading]
     profiles: Sequence[ProfileComparison]
     failures: Sequence[Failure]
     tags: Mapping[str, Sequence[str]]
@@ -71,6 +73,7 @@ def overview(results: Results) -> Overview:
         findings=finding_sentences(results),
         counts=tally,
         statuses=results.statuses(),
+        leading=leading_errors(results),
         profiles=profiles,
         failures=failures(results),
         tags=conditions(results),
@@ -95,7 +98,7 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = (), e
     failed = [f"✗ {failure.sentence}" for failure in summary.failures]
     failures_listed = Sentences(failed, commands=[failure.reproduce for failure in summary.failures], on_terminal=False)
     versions = ", ".join(f"{name} {version or 'not installed'}" for name, version in results.provenance["versions"].items())
-    matrix, notes = matrix_of(results, summary.statuses)
+    matrix, notes = matrix_of(summary.statuses, summary.leading)
     parts = [
         *tables,
         Heading("Summary", on_page=False, on_terminal=bool(tables)),

@@ -49,16 +49,14 @@ class AsymmetricTop:
         """
         from scipy.spatial.transform import Rotation
 
-        order = _circled_axis_last(moments, spin)
+        order, to_b = _circled_axis_last(moments, spin)  # L² - 2 T Ib
         self._axes = axes @ order.T  # columns: a, b, c in the body frame
         self._moments = Ia, Ib, Ic = tuple(float(value) for value in np.abs(order) @ moments)
-        exact_spin = tuple(order.astype(int) @ spin)
-        spin_a, spin_b, spin_c = map(float, exact_spin)
+        spin_a, spin_b, spin_c = (order @ spin.astype(float) + 0.0).tolist()  # no -0.0, whose sign copysign would take
 
         # Written as sums of products of one sign, in which 2T I_c - L² and the others lose no digits.
         to_c = Ia * (Ic - Ia) * spin_a**2 + Ib * (Ic - Ib) * spin_b**2  # 2 T Ic - L²
         to_a = Ib * (Ib - Ia) * spin_b**2 + Ic * (Ic - Ia) * spin_c**2  # L² - 2 T Ia
-        to_b = _beyond_separatrix(self._moments, exact_spin)  # L² - 2 T Ib
         self._a = math.sqrt(to_c / (Ia * (Ic - Ia)))
         self._b = math.sqrt(to_c / (Ib * (Ic - Ib)))
         self._c = math.copysign(math.sqrt(to_a / (Ic * (Ic - Ia))), spin_c)
@@ -128,18 +126,16 @@ class AsymmetricTop:
         return np.stack([first, cross(along, first), along], axis=2), spins
 
 
-def _circled_axis_last(moments: Array, spin: Exact) -> Array:
-    """The proper signed permutation, (3, 3), to axes a, b, c with b intermediate and c the one that L circles."""
+def _circled_axis_last(moments: Array, spin: Exact) -> tuple[Array, Fraction]:
+    """The proper signed permutation, (3, 3), to axes a, b, c with b intermediate and c the one that L circles; and L² - 2 T I_b.
+
+    L circles the axis of the largest moment if L² - 2 T I_b = I_c (I_c - I_b) ω_c² - I_a (I_b - I_a) ω_a² is not below 0, whichever of
+    the two others is called c. It is a difference, taken in exact rationals.
+    """
     ascending = np.argsort(moments, kind="stable")
-    ordered = tuple(float(value) for value in moments[ascending])
-    circles_largest = _beyond_separatrix(ordered, tuple(spin[ascending])) >= 0
-    order = np.eye(3)[ascending if circles_largest else ascending[::-1]]
+    Ia, Ib, Ic = map(Fraction, moments[ascending].tolist())
+    wa, _, wc = spin[ascending]
+    beyond = Ic * (Ic - Ib) * wc**2 - Ia * (Ib - Ia) * wa**2
+    order = np.eye(3)[ascending if beyond >= 0 else ascending[::-1]]
     order[2] *= np.linalg.det(order)
-    return order
-
-
-def _beyond_separatrix(moments: tuple[float, ...], spin: tuple[Fraction, ...]) -> Fraction:
-    """L² - 2 T I_b = I_c (I_c - I_b) ω_c² - I_a (I_b - I_a) ω_a², a difference, in exact rationals."""
-    Ia, Ib, Ic = map(Fraction, moments)
-    wa, _, wc = spin
-    return Ic * (Ic - Ib) * wc**2 - Ia * (Ib - Ia) * wa**2
+    return order, beyond

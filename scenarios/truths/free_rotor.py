@@ -101,9 +101,16 @@ def principal_spin(orientation: Array, angular_velocity: Array) -> Rotor:
 
 def _along(axes: Array, orientation: Array, angular_velocity: Array) -> Exact:
     """Components along body axes, the columns of (3, 3), of a vector in the world frame, in exact rationals, shape (3,)."""
-    x, y, z, w = map(Fraction, orientation.tolist())
-    vector = np.array([Fraction(component) for component in angular_velocity.tolist()])
-    along, across = np.array([x, y, z]), np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    squares = w * w + along @ along
-    spin = ((w * w - along @ along) * vector + 2 * (along @ vector) * along - 2 * w * (across @ vector)) / squares
-    return np.array([[Fraction(component) for component in axis] for axis in axes.T.tolist()]) @ spin
+    (quaternion, _), (vector, of_vector), (rows, of_rows) = map(_over_one_denominator, (orientation, angular_velocity, axes.T))
+    along, (x, y, z, w) = quaternion[:3], quaternion
+    across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    spin = (w * w - along @ along) * vector + 2 * (along @ vector) * along - 2 * w * (across @ vector)
+    denominator = (w * w + along @ along) * of_vector * of_rows
+    return np.array([Fraction(numerator, denominator) for numerator in rows @ spin])
+
+
+def _over_one_denominator(values: Array) -> tuple[Exact, int]:
+    """Numbers as integers over a common denominator, which take a tenth of the time of fractions in lowest terms."""
+    ratios = [value.as_integer_ratio() for value in values.ravel().tolist()]
+    common = max(denominator for _, denominator in ratios)  # of doubles: powers of 2
+    return np.array([numerator * (common // denominator) for numerator, denominator in ratios], object).reshape(values.shape), common

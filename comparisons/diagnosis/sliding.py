@@ -31,21 +31,25 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     if not facts.lands or not facts.friction > 0.0 or _is_ball(facts):
         return []
     free, exact = SLIDE**2 / (2.0 * facts.friction * facts.gravity), _stop(facts)
-    blank = Answer("slide", "stopping distance", "m", speed=SLIDE, physical=free)
+    blank, long = Answer("slide", "stopping distance", "m", speed=SLIDE, physical=free), f"more than {LONGEST_SLIDE:g} m: not simulated"
     if free > LONGEST_SLIDE:
-        return [replace(blank, detail=f"more than {LONGEST_SLIDE:g} m: not simulated")]
+        return [replace(blank, detail=long)]
     if not is_at_rest(body):
         return [replace(blank, direction=way, detail=MOVES) for way in WAYS]
     end = body.settled[-1:]
     rests = [body.motions(end, dt, math.ceil(WATCHED / dt), -facts.gravity * UP, floor=True)[0, -1] for dt in dts]
     half = math.sqrt(0.5)
-    along, across = (_stops(body, dts, rests, direction) for direction in (np.array([1.0, 0.0, 0.0]), np.array([half, 0.0, half])))
+    least = float(np.nanmin([facts.friction, facts.friction_across]))
+    longest = SLIDE**2 / (2.0 * LONGEST_SLIDE * facts.gravity)  # the friction of the longest slide
+    along = _stops(body, dts, rests, np.array([1.0, 0.0, 0.0]), facts.friction)
+    across = _stops(body, dts, rests, np.array([half, 0.0, half]), max(least, longest))
     if not along or not across:
         return [replace(blank, direction=way, detail=TIPS) for way in WAYS]
     ways = zip(WAYS, (along, across), strict=True)
     answers = [judged(body, replace(blank, direction=way), dts, stops, [exact] * len(dts), OF_FALLS) for way, stops in ways]
     if not math.isnan(facts.friction_across):
-        return [answers[0], replace(blank, direction=WAYS[1], physical=math.nan, measured=across[0])]
+        turned = replace(blank, direction=WAYS[1], physical=math.nan)
+        return [answers[0], replace(turned, detail=long) if least < longest else replace(turned, measured=across[0])]
     if SLIDE / (facts.friction * facts.gravity) < LONG_SLIDE:
         answers = [_of_short_slide(one) for one in answers]
     return answers
@@ -59,19 +63,19 @@ def _of_short_slide(answer: Answer) -> Answer:
     return replace(answer, findings=tuple(found for found in answer.findings if not is_small or (is_known and not found.is_error)))
 
 
-def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direction: Array) -> list[float]:
-    """The distances in which a body that slides in a direction stops [m]; empty if it tips or rolls."""
+def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direction: Array, friction: float) -> list[float]:
+    """The distances in which a body that slides in a direction stops [m], with this friction or more; empty if it tips or rolls."""
     facts, found = body.facts, []
     for dt, rest in zip(dts, rests, strict=True):
         start = rest.copy()
         start[VELOCITY], start[SPIN] = SLIDE * direction, 0.0
-        steps = math.ceil((1.5 * SLIDE / (facts.friction * facts.gravity) + 0.1) / dt)
+        steps = math.ceil((1.5 * SLIDE / (friction * facts.gravity) + 0.1) / dt)
         states = body.motions(start[np.newaxis], dt, steps, -facts.gravity * UP, floor=True)[0]
         if tilt(states) > UNTURNED:
             return []
         foot = unrotate(start[ORIENTATION], -start[1] * UP)  # a point of the body below its centre, which sways less
         moved = states[-1, POSITION] - start[POSITION] + rotate(states[-1, ORIENTATION], foot) - rotate(start[ORIENTATION], foot)
-        found.append(float(moved @ direction))
+        found.append(float(np.hypot(moved[0], moved[2])))  # friction that differs between directions turns the motion
     return found
 
 

@@ -1,5 +1,6 @@
 """Contacts of MJCF files in MuJoCo: targets, bodies that roll on soft surfaces or do not rest, and remedies that keep a target."""
 
+import numpy as np
 import pytest
 from support.model_files import FREE, body_of, findings_of, ladder
 
@@ -67,6 +68,20 @@ def test_both_coefficients_of_a_pair_are_judged(tmp_path):
     [body] = diagnose(tmp_path / "pair.xml", friction=0.2).bodies
     assert {body.friction, body.friction_across} == {0.2, 0.4}
     assert [answer.measured for answer, finding in body.findings if finding.kind == "target"] == [0.4]
+
+
+def test_slide_between_directions_of_different_friction_is_followed_to_its_end(tmp_path):
+    """It stops when the smaller friction has stopped it, beside the direction in which it began: as MuJoCo's own slide of 2 s."""
+    import mujoco
+
+    box = '<body name="b" pos="0 0 .05"><freejoint/><geom name="g" type="box" size=".1 .1 .05"/></body>'
+    pair = '<contact><pair geom1="floor" geom2="g" friction="0.1 1"/></contact>'
+    body = body_of(tmp_path, box, 'cone="elliptic"', pair)
+    data = mujoco.MjData(model := mujoco.MjModel.from_xml_path(str(tmp_path / "model.xml")))
+    data.qvel[:2] = 0.5 * np.sqrt(0.5)
+    mujoco.mj_step(model, data, 1000)
+    [stopped] = [answer.measured for answer in slide(body, [body.facts.dt]) if answer.direction == "45°"]
+    assert stopped == pytest.approx(np.hypot(*data.qpos[:2]), rel=0.01)
 
 
 @pytest.mark.parametrize("geom", ['solref="0.2 1"', 'margin="0.003"'], ids=["6 mm deep", "3 mm above"])

@@ -158,7 +158,7 @@ def _above_floor(scene: Scenario, start: Start, states: Array, dt: float) -> tup
         if steps * dt > start.toss.t[start.frame] - start.toss.t[start.first]:
             raise DropspinError(
                 f"toss {start.toss.name}: the body is {1e3 * depth:.3g} mm below the floor during its flight; "
-                "correct floor_height, up, tracked_point or the size of the body."
+                "correct floor_height, up, tracked_point, or the size or centre of mass of the body."
             )
         flown = [flight_states(state, scene.body.inertia_tensor, scene.acceleration) for state in states]
         found = np.vstack([flight(np.array([-steps * dt])) for flight in flown])

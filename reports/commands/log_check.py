@@ -3,6 +3,7 @@
 import click
 
 from dropspin.reports.commands.options import as_json, output_option
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("check")
@@ -16,7 +17,8 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
     Gravity, scale, drag, inertia and centre of mass are estimated from the flights alone, each with a 95 % interval. Wrong units, axes,
     quaternion orders and frame rates are listed with remedies. In the output folder, corrected.toml is the header with every remedy that
     is the only one for its finding. If the header has a floor, the folder scenes/ has a scene for each toss and one for all tosses, which
-    begin at the end of the flights; dropspin run compares engines with them.
+    begin at the end of the flights; dropspin run compares engines with them. They are not written if the header has the body below the
+    floor there.
 
     Exit code: 0 no finding, 1 a finding, 2 bad input.
     """
@@ -24,12 +26,18 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
     from dropspin.comparisons.logs.replay import measured_scene
     from dropspin.reports.stories.log_check import CheckedLog
     from dropspin.reports.study_files import write_scenes, write_toml, written_study
+    from dropspin.scenarios import DropspinError
 
     with written_study(output, json_output, has_report=True) as keep:
         check = log_check(recording)
         folder = keep(CheckedLog.of(recording, check))
         write_toml(check.corrected.model_dump(mode="json", exclude_none=True), folder / "corrected.toml")
         can_continue = check.reads_the_columns_right and check.flights.log.header.floor is not None
-        if can_continue and (scene := measured_scene(check.flights)) is not None:
-            write_scenes(scene, folder / "scenes")
+        try:
+            scene = measured_scene(check.flights) if can_continue else None
+        except DropspinError as error:  # the findings say what is wrong with the header
+            echo(f"scenes/ is not written: {error}", err=True)
+        else:
+            if scene is not None:
+                write_scenes(scene, folder / "scenes")
     return int(bool(check.findings))

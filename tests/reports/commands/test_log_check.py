@@ -19,7 +19,7 @@ from dropspin.reports.stories.log_check import SPINNING, CheckedLog
 from dropspin.reports.stories.log_findings import sentence
 from dropspin.reports.stories.log_fit import FittedLog
 from dropspin.reports.study_files import read_study
-from dropspin.scenarios import load
+from dropspin.scenarios import DropspinError, load
 
 
 @pytest.fixture
@@ -103,6 +103,21 @@ def test_corrected_header_has_the_remedies_and_loads(cube):
     log = load_log(folder / "out" / "corrected.toml")
     assert (log.header.length_scale, log.header.body.center_of_mass) == (0.978, (-0.0002, 0.0009, 0.0061))
     assert len(log.tosses) == 100
+
+
+def test_check_is_kept_if_scenes_cannot_start_above_the_floor(recording, monkeypatch):
+    """As with the centre of mass in a wrong place, which is the finding."""
+
+    def below(flights):
+        raise DropspinError("toss 1: the body is 34 mm below the floor during its flight.")
+
+    monkeypatch.setattr("dropspin.comparisons.logs.replay.measured_scene", below)
+    with (recording / "toss.toml").open("a") as file:
+        file.write("[floor]\nrestitution = 0.5\nfriction = 0.5\n")
+    done = dropspin("log", "check", "toss.toml", "-o", "out", cwd=recording)
+    assert (done.returncode, done.stdout.splitlines()[-2]) == (0, "0 findings.")
+    assert "scenes/ is not written: toss 1: the body is 34 mm below the floor during its flight." in done.stderr
+    assert {"report.html", "corrected.toml"} <= {path.name for path in (recording / "out").iterdir()}
 
 
 def test_page_shows_what_is_printed_of_the_shipped_tosses(cube):

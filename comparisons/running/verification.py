@@ -86,7 +86,7 @@ def verify_starts(engine: Engine, scenes: Sequence[Scenario], states: NDArray[np
 
 
 def verified_record(states: Any, rows: int) -> NDArray[np.float64]:
-    """An engine's record as float64: the number of rows asked for, unit quaternions; numbers that are not finite are let through.
+    """A copy of an engine's record as float64: the number of rows asked for, unit quaternions; numbers that are not finite are let through.
 
     Raises:
         BuildMismatch: It is not such a record.
@@ -94,7 +94,7 @@ def verified_record(states: Any, rows: int) -> NDArray[np.float64]:
     record = numpy_array(states)
     if np.iscomplexobj(record):
         raise BuildMismatch("the record has complex numbers")
-    record = np.asarray(record, dtype=float)
+    record = np.array(record, dtype=float)
     if record.shape != (rows, 13):
         raise BuildMismatch(f"the record has shape {record.shape}; {rows} states of 13 numbers were asked for, shape ({rows}, 13)")
     if not np.isfinite(record).all():
@@ -111,7 +111,7 @@ def verified_record(states: Any, rows: int) -> NDArray[np.float64]:
 
 
 def verified_batch(states: Any, size: int, rows: int) -> NDArray[np.float64]:
-    """An engine's record of a batch as float64, shape (size, rows, 13), each of its motions as in `verified_record`.
+    """A copy of an engine's record of a batch as float64, shape (size, rows, 13), each of its motions as in `verified_record`.
 
     Raises:
         BuildMismatch: It is not such a record.
@@ -122,7 +122,7 @@ def verified_batch(states: Any, size: int, rows: int) -> NDArray[np.float64]:
     if batch.shape == (size, rows, 13) and batch.dtype == float:
         squares = np.einsum("...i,...i->...", batch[..., ORIENTATION], batch[..., ORIENTATION])
         if max(squares.max() - 1.0, 1.0 - squares.min()) <= UNIT_TOLERANCE:  # at least as far from 1 as the lengths; NaN is not
-            return batch
+            return batch.copy()
     return np.array([verified_record(motion, rows) for motion in batch])
 
 

@@ -467,20 +467,6 @@ def test_faults_of_batches_are_found(fault):
     assert expected in message
 
 
-def test_record_of_a_batch_in_memory_that_is_used_again_fails():
-    rows = {}
-
-    class Reusing(made.Together):
-        def record(self, steps, every=1):
-            found = super().record(steps, every)
-            kept = rows.setdefault(found.shape, found)
-            kept[:] = found
-            return kept
-
-    [(_, message)] = not_passed(batched_by(Reusing), "batches").values()
-    assert message.startswith("record returns memory that later steps overwrite; return a copy")
-
-
 def test_engine_without_batches_declines_their_check():
     found = run_check(EngineEntry("documented", documented()), "batches")
     assert (found.outcome, found.message) == ("declined", "prepare_batch returns None: the engine simulates one scene at a time")

@@ -5,7 +5,7 @@ import pytest
 from support import engines as made
 
 from dropspin.comparisons.engines.base import BatchSimulation
-from dropspin.comparisons.running.verification import BuildMismatch, verified_batch, verify_start, verify_starts
+from dropspin.comparisons.running.verification import BuildMismatch, verified_batch, verified_record, verify_start, verify_starts
 from dropspin.scenarios import load
 from dropspin.scenarios.model import initial_states
 from dropspin.scenarios.rotations import rotate, unrotate
@@ -63,6 +63,14 @@ def test_one_wrong_quaternion_in_a_batch_is_found(length):
         verified_batch(states, 40, 3)
     states[39, 2, 7] = np.nan  # a divergence, which has a verdict of its own
     assert np.isnan(verified_batch(states, 40, 3)[39]).any()
+
+
+def test_record_in_memory_of_the_engine_is_copied():
+    """The engine may use it for its next simulation, or free it."""
+    states = motions_of_a_batch()
+    batch, motion = verified_batch(states, 40, 3), verified_record(states[0], 3)
+    states[:] = 2.0
+    assert (batch.max(), motion.max()) == (1.0, 1.0)
 
 
 def test_record_of_single_precision_and_of_a_divergence_are_converted_and_kept():

@@ -12,6 +12,8 @@ from importlib.util import find_spec, resolve_name
 from itertools import accumulate
 from pathlib import Path
 
+from dropspin.comparisons.engines.program_engine import ProgramEngine
+
 PACKAGE, COMMON = "dropspin.comparisons.engines", frozenset({"base", "options", "packages"})
 INSTALLED = frozenset({"site-packages", "dist-packages"})
 STANDARD = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib"))
@@ -19,6 +21,8 @@ STANDARD = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdl
 
 def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
     """A short hash of an adapter's file and of every module that it loads, outside the standard library and installed packages.
+
+    Of a `ProgramEngine`, the files that its command names belong to it.
 
     The modules are those that the files import, in functions too; modules that are imported by a computed name are found only in `loaded`.
 
@@ -37,7 +41,8 @@ def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
         return built_in_code(file)
     files = _with_imports({file: adapter.__module__}, _file)
     further = {other: name for name in loaded if (other := _file(name)) is not None and other not in files}
-    return hash_of({**files, **_with_imports(further, _file)})
+    command = adapter.command() if issubclass(adapter, ProgramEngine) else ()
+    return hash_of({**files, **_with_imports(further, _file)} | {Path(part): part for part in command if Path(part).is_file()})
 
 
 def built_in_code(file: Path) -> str:

@@ -6,12 +6,13 @@ steps, and for the state after them. A state is a line of 13 numbers. The progra
 
 import hashlib
 import inspect
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from select import select
 from signal import Signals
-from subprocess import PIPE, Popen
+from subprocess import PIPE, Popen, TimeoutExpired
 from tempfile import TemporaryFile
 from typing import ClassVar
 
@@ -19,6 +20,7 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import Array, Engine, Simulation
 from dropspin.scenarios import Scenario
+from dropspin.scenarios.text import counted
 from dropspin.scenarios.validation import shown
 
 PATIENCE, PATIENCE_OF_A_STEP = 10.0, 1.0
@@ -44,10 +46,20 @@ class ProgramEngine(Engine):
     def declines(self, scene: Scenario) -> str | None:
         return "the adapter passes on no floor that ends" if scene.floor is not None and scene.floor.ends else None
 
+    @classmethod
+    def command(cls) -> list[str]:
+        """`program`, with the paths of files in the folder of the class's module.
+
+        Raises:
+            TypeError: `program` is not a sequence of strings.
+        """
+        if isinstance(cls.program, str) or not cls.program:
+            raise TypeError(f'`program` is {shown(cls.program)}; give the command and its arguments, such as ("./solver",)')
+        folder = Path(inspect.getfile(cls)).resolve().parent
+        return [str(folder / part) if (folder / part).is_file() else part for part in cls.program]
+
     def prepare(self, scene: Scenario, dt: float) -> "ProgramSimulation":
-        folder = Path(inspect.getfile(type(self))).resolve().parent
-        command = [str(folder / part) if (folder / part).is_file() else part for part in self.program]
-        return ProgramSimulation(scene, dt, command, self.lag * dt)
+        return ProgramSimulation(scene, dt, self.command(), self.lag * dt)
 
 
 class ProgramSimulation(Simulation):
@@ -88,12 +100,13 @@ class ProgramSimulation(Simulation):
             raise RuntimeError(f"the program wrote {shown(self._unread.decode(errors='replace'))} before {asked!r}; an answer is one line")
         with suppress(BrokenPipeError):  # the program ended, so that there is no answer
             requests.write(f"{lines}\n".encode())
+        end = time.monotonic() + patience
         while b"\n" not in self._unread:
-            written = self._written(patience)
+            written = self._written(max(0.0, end - time.monotonic()))
             if written is None:
                 raise RuntimeError(f"the program did not answer {asked!r} within {patience:g} s; does it flush its output?")
             if not written:
-                raise RuntimeError(f"the program ended with {self._end()} instead of answering {asked!r}")
+                raise RuntimeError(f"the program {self._end()} instead of answering {asked!r}")
             self._unread += written
         line, _, self._unread = self._unread.partition(b"\n")
         answer = line.decode(errors="replace").rstrip()
@@ -102,7 +115,8 @@ class ProgramSimulation(Simulation):
         except ValueError:
             numbers = np.empty(0)
         if numbers.shape != (13,):
-            raise RuntimeError(f"the program answered {asked!r} with {shown(answer)}; a state is a line of 13 numbers")
+            found = f"{shown(answer)}, {counted(len(answer.split()), 'word')}"
+            raise RuntimeError(f"the program answered {asked!r} with {found}; a state is a line of 13 numbers")
         return numbers
 
     def _written(self, patience: float) -> bytes | None:
@@ -113,10 +127,13 @@ class ProgramSimulation(Simulation):
 
     def _end(self) -> str:
         """How the program ended, and the last line of its standard error."""
-        code = self._process.wait()
+        try:
+            code = self._process.wait(PATIENCE_OF_A_STEP)
+        except TimeoutExpired:
+            return "closed its output"
         self._errors.seek(0)
         lines = self._errors.read().decode(errors="replace").splitlines()
-        how = Signals(-code).name if code < 0 else f"exit code {code}"
+        how = f"ended with {Signals(-code).name if code < 0 else f'exit code {code}'}"
         return how + (f" and the last line {shown(lines[-1])}" if lines else "")
 
 

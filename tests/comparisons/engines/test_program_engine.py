@@ -13,6 +13,7 @@ import pytest
 import dropspin as ds
 from dropspin.comparisons.conformance.checks import run_check
 from dropspin.comparisons.engines import program_engine
+from dropspin.comparisons.engines.adapter_code import adapter_code
 from dropspin.comparisons.engines.program_engine import scene_lines
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.recording import Breakdown, divergence, try_record
@@ -20,7 +21,7 @@ from dropspin.comparisons.running.recording import Breakdown, divergence, try_re
 DOCS = Path(__file__).parents[3] / "docs"
 SPIN, TUMBLE = ds.load("fall-spin"), ds.load("drop-box-tumble")
 STATE = "0 0 0 0 0 0 1 0 0 0 0 0 0"
-LOOP = "import sys\nfor line in sys.stdin:\n    word = line.split()[0]\n    if word in ('start', 'advance'): {}\n"
+LOOP = "import os, sys, time\nfor line in sys.stdin:\n    word = line.split()[0]\n    if word in ('start', 'advance'): {}\n"
 
 
 @pytest.fixture(scope="module")
@@ -68,13 +69,15 @@ def python(answer):
             "crashed",
             r"the program ended with exit code 1 and the last line 'no such body' instead of answering 'start'",
         ),
-        (python("import os; os.kill(os.getpid(), 11)"), "crashed", "the program ended with SIGSEGV instead of answering 'start'"),
-        (python("print('hello')"), "crashed", "the program answered 'start' with 'hello'; a state is a line of 13 numbers"),
+        (python("os.kill(os.getpid(), 11)"), "crashed", "the program ended with SIGSEGV instead of answering 'start'"),
+        (python("print('hello')"), "crashed", "the program answered 'start' with 'hello', 1 word; a state is a line of 13 numbers"),
         (python("print(line[6:].strip() if word == 'start' else '1 2 3')"), "crashed", "the program answered 'advance 1' with '1 2 3'"),
         (python("print(line[6:].strip() if word == 'start' else 'nan ' * 13)"), "diverged", "the state is not finite"),
         (python("sys.stdout.write(line[6:] + '2\\n')"), "crashed", r"the program wrote '2\\n' before 'advance 1'; an answer is one line"),
         (python(f"print('{STATE}')"), "crashed", "velocity at the start is"),
+        (python("os.close(1); time.sleep(9)"), "crashed", "the program closed its output instead of answering 'start'"),
         (program("absent-solver"), "crashed", "'absent-solver' cannot be started: No such file or directory"),
+        (program(), "crashed", r'`program` is \(\); give the command and its arguments, such as \("./solver",\)'),
     ],
 )
 def test_program_that_breaks_costs_its_row(engine, verdict, reason):
@@ -98,6 +101,23 @@ def test_program_that_does_not_answer_is_ended(monkeypatch):
     assert found.reason == "RuntimeError: the program did not answer 'start' within 1 s; does it flush its output?"
 
 
+def test_program_that_writes_its_answer_slowly_has_the_time_of_an_answer_for_all_of_it(monkeypatch):
+    monkeypatch.setattr(program_engine, "PATIENCE", 1.0)
+    found = try_record(python("[(print('1', end=' '), time.sleep(0.3)) for _ in range(20)]"), SPIN, 0.01)
+    assert found.reason.startswith("RuntimeError: the program did not answer 'start' within 1 s")
+
+
+def test_changed_program_is_another_engine(tmp_path):
+    """A run that was interrupted is not resumed with it."""
+    solver = tmp_path / "solver"
+    solver.write_text("echo 1")
+    engine = type(program(str(solver)))
+    before = adapter_code(engine)
+    assert adapter_code(engine) == before
+    solver.write_text("echo 2")
+    assert adapter_code(engine) != before
+
+
 @pytest.mark.parametrize("stated", [{}, {"lag": 0.0}])
 def test_lag_of_a_program_is_what_its_class_states(stated):
     """By default that of Algorithm 1."""
@@ -109,7 +129,7 @@ def test_lag_of_a_program_is_what_its_class_states(stated):
 def test_slow_program_is_waited_for(monkeypatch):
     """An interpreted program that takes 30 ms a step, and most of a second for all of them."""
     monkeypatch.setattr(program_engine, "PATIENCE", 0.2)
-    answer = f"import time; time.sleep(0.03 * int(line.split()[1]) if word == 'advance' else 0); print('{STATE}')"
+    answer = f"time.sleep(0.03 * int(line.split()[1]) if word == 'advance' else 0); print('{STATE}')"
     with python(answer).prepare(SPIN, 0.01) as simulation:
         simulation.advance(20)
         assert simulation.state()[6] == 1.0

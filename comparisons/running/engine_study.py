@@ -160,15 +160,16 @@ class EngineStudy:
                 yield extrapolated.measurement("asymptotic_error", name, metric.unit, error, truths[metric.kind])
 
     def explaining_settings(self, rows: Sequence[Measurement]) -> Iterator[Measurement]:
-        """The changed settings that explain the error of the leading metric, or else the largest, that fails at the finest time step."""
+        """The changed settings that explain the leading error, or else the largest, of those that fail at the finest time step or as dt → 0."""
         scene, engine = self.own.scene, self.entry.engine
-        failing = [row for row in rows if row.verdict in FAILURES and row.kind in ("truth", "invariant") and row.metric not in ARTEFACTS]
+        measured = [row for row in rows if row.kind in ("truth", "invariant") and row.metric not in ARTEFACTS]
+        as_dt_falls = {row.metric for row in rows if row.kind == "asymptotic_error" and row.verdict in FAILURES}
+        failing = [row for row in measured if row.verdict in FAILURES] or [row for row in measured if row.metric in as_dt_falls]
         if engine is None or engine.is_calibrated or not failing or self.own.truth is None:
             return
         dt = min(row.dt for row in failing)
         sizes = {row.metric: abs(row.value) / scale(scene, row.unit) for row in failing if row.dt == dt}
-        leading = leading_metric(scene)
-        metric = METRICS[leading if leading in sizes else max(sizes, key=lambda name: sizes[name])]
+        metric = METRICS[max(sizes, key=lambda name: (name == leading_metric(scene), sizes[name]))]
         options = self.processes.call(self.entry, written_out, scene, dt)
         if isinstance(options, Breakdown):
             return

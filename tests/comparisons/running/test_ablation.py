@@ -111,6 +111,14 @@ def test_run_states_the_settings_that_explain_a_failure():
     assert settings_of(results, "pybullet") == []
 
 
+def test_settings_are_stated_where_errors_fail_as_dt_falls_alone():
+    """As in a scene of one's own, which has no bound: that of energy is computed from the step alone."""
+    scene = load("fall-spin").model_copy(update={"expect": (), "duration": 0.3})
+    table = run(scene, ["pybullet[linear_damping=0.04]"], [4e-3, 2e-3, 1e-3]).table
+    assert set(table[table["verdict"] == "failed"]["kind"]) == {"asymptotic_error"}
+    assert list(table[table["kind"] == "setting"]["truth"]) == ["linearDamping=0.04"]
+
+
 def test_settings_that_act_against_each_other_have_shares_of_both_signs():
     """An error of 1 of which one setting makes 1.04, and another takes 0.04 away."""
     parts = {"density": 1.04, "integrator": -0.04, "other": 0.0}

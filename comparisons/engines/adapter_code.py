@@ -16,13 +16,14 @@ from dropspin.comparisons.engines.program_engine import ProgramEngine
 
 PACKAGE, COMMON = "dropspin.comparisons.engines", frozenset({"base", "options", "packages"})
 INSTALLED = frozenset({"site-packages", "dist-packages"})
+LIBRARIES = frozenset({".so", ".dylib", ".dll", ".pyd"})
 STANDARD = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib"))
 
 
 def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
     """A short hash of an adapter's file and of every module that it loads, outside the standard library and installed packages.
 
-    Of a `ProgramEngine`, the files that its command names belong to it.
+    The shared libraries in the folder of the adapter's file belong to it, and the files in the command of a `ProgramEngine`.
 
     The modules are those that the files import, in functions too; modules that are imported by a computed name are found only in `loaded`.
 
@@ -41,8 +42,9 @@ def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
         return built_in_code(file)
     files = _with_imports({file: adapter.__module__}, _file)
     further = {other: name for name in loaded if (other := _file(name)) is not None and other not in files}
-    command = adapter.command() if issubclass(adapter, ProgramEngine) else ()
-    return hash_of({**files, **_with_imports(further, _file)} | {Path(part): part for part in command if Path(part).is_file()})
+    compiled = [] if INSTALLED.intersection(file.parts) else [path for path in file.parent.iterdir() if path.suffix in LIBRARIES]
+    compiled += map(Path, adapter.command()) if issubclass(adapter, ProgramEngine) else []
+    return hash_of({*files, *_with_imports(further, _file), *filter(Path.is_file, compiled)})
 
 
 def built_in_code(file: Path) -> str:

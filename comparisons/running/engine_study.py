@@ -160,7 +160,7 @@ class EngineStudy:
                 yield extrapolated.measurement("asymptotic_error", name, metric.unit, error, truths[metric.kind])
 
     def explaining_settings(self, rows: Sequence[Measurement]) -> Iterator[Measurement]:
-        """The changed settings that explain the leading error, or else the largest, of those that fail at the finest time step or as dt → 0."""
+        """The changed settings that explain the leading, or else the largest error that fails at the finest time step, or as dt → 0."""
         scene, engine = self.own.scene, self.entry.engine
         measured = [row for row in rows if row.kind in ("truth", "invariant") and row.metric not in ARTEFACTS]
         as_dt_falls = {row.metric for row in rows if row.kind == "asymptotic_error" and row.verdict in FAILURES}

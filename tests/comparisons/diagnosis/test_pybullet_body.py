@@ -85,7 +85,7 @@ def test_links_that_are_fixed_to_each_other_are_one_body(tmp_path):
     assert of_tumble.limit == pytest.approx(of_tumble.in_force, rel=1e-4)
     assert fall(both, DTS)[0].limit == pytest.approx(4.558187518993211, rel=1e-6)
     for answer in spin(both, DTS):
-        assert answer.limit == pytest.approx(answer.in_force, rel=0.005)
+        assert answer.limit == pytest.approx(answer.in_force, rel=1e-4)
 
 
 def test_an_inertia_that_is_not_in_force_is_named(tmp_path):

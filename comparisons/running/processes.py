@@ -12,6 +12,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from multiprocessing import get_all_start_methods, get_context
 from types import TracebackType
@@ -193,9 +194,10 @@ def _system_errors_named(entry: EngineEntry) -> Iterator[None]:
     """Raise `DropspinError` for an error of the system while a process is started, which is none of a file that is being written."""
     try:
         yield
-    except OSError as error:
+    except (OSError, BrokenProcessPool) as error:
+        reason = error.__cause__ or error  # of a pool that could not start its process
         raise DropspinError(
-            f"the system cannot start a process for {entry.label}: {error.strerror or error}; shared memory (/dev/shm) must be writable "
+            f"the system cannot start a process for {entry.label}: {getattr(reason, 'strerror', None) or reason}; shared memory (/dev/shm) must be writable "
             "and not full, and the limits of processes and open files must not be reached (ulimit -u, ulimit -n)."
         ) from None
 

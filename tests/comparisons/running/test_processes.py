@@ -8,6 +8,7 @@ import sys
 import textwrap
 import threading
 import time
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from unittest import mock
 
@@ -78,10 +79,13 @@ def test_sleeping_engine_is_ended_by_the_wall_clock():
 @pytest.mark.parametrize(
     "where", ["dropspin.comparisons.running.processes.ProcessPool", "dropspin.comparisons.running.processes.ProcessPool.schedule"]
 )
-@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS, errno.EAGAIN])
-def test_system_that_starts_no_process_is_not_blamed_on_the_output_folder(where, code, tmp_path, monkeypatch):
-    """Such as shared memory that is full or read-only, and a limit of processes."""
-    monkeypatch.setattr(where, mock.Mock(side_effect=OSError(code, os.strerror(code))))
+@pytest.mark.parametrize(("code", "of_pool"), [(errno.ENOSPC, False), (errno.EROFS, False), (errno.EAGAIN, False), (errno.EMFILE, True)])
+def test_system_that_starts_no_process_is_not_blamed_on_the_output_folder(where, code, of_pool, tmp_path, monkeypatch):
+    """Such as shared memory that is full or read-only, and limits of processes and of open files."""
+    error = OSError(code, os.strerror(code))
+    broken = BrokenProcessPool()
+    broken.__cause__ = error
+    monkeypatch.setattr(where, mock.Mock(side_effect=broken if of_pool else error))
     done = dropspin("run", "drop-ball", "-e", "wang", "--dt", "0.01", "-o", "out", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.splitlines()[-1].startswith(f"dropspin: the system cannot start a process for wang: {os.strerror(code)}; shared ")

@@ -272,21 +272,26 @@ class BodyText:
         yield "visual", words, f"counted in the mass with {has.mass - least.mass:.4g} kg, by density, although it collides with nothing"
 
     def _changed(self, name: str, made: str) -> Ignored:
-        """A quantity that the compiler changes, with what is written, and the settings of which each alone makes a difference."""
-        found = {setting: option_setting(self._file.source, "compiler", setting, "") for setting in (*NEUTRAL, "balanceinertia")}
-        why = [words for setting, words in found.items() if words.file and self._acts(setting, name)]
-        written = self.settings.get(name)
-        if written is None:
-            return name, why[0] if why else Setting(name), made
-        return name, written, made + (f", by {', '.join(map(str, why))}" if why else "")
+        """A quantity that the compiler changes, with what is written, and the settings of which each alone makes a difference.
 
-    def _acts(self, setting: str, name: str) -> bool:
-        """Whether a setting of the compiler alone changes a quantity."""
+        That with the largest effect comes first.
+        """
+        found = {setting: option_setting(self._file.source, "compiler", setting, "") for setting in (*NEUTRAL, "balanceinertia")}
+        effects = {setting: self._effect(setting, name) for setting, words in found.items() if words.file}
+        why = [found[setting] for setting in sorted(effects, key=effects.__getitem__, reverse=True) if effects[setting]]
+        first = [one for one in [self.settings.get(name)] if one] or why[:1] or [Setting(name)]
+        others = [str(one) for one in why if one not in first]
+        return name, first[0], made + (f", by {', '.join(others)}" if others else "")
+
+    def _effect(self, setting: str, name: str) -> float:
+        """By how much a setting of the compiler alone changes a quantity, in its unit; 0 for rounding."""
         if setting == "balanceinertia":
             without, has = self.written, self._unchanged
         else:
             without, has = (self._properties(one) for one in (self._file.recompiled.without(setting), self._file.compiled))
-        return without is not None and has is not None and _differ(getattr(without, name), getattr(has, name))
+        if without is None or has is None or not _differ(getattr(without, name), getattr(has, name)):
+            return 0.0
+        return float(np.abs(np.subtract(getattr(without, name), getattr(has, name))).max())
 
 
 def _differ(wanted: Any, has: Any) -> bool:

@@ -195,10 +195,11 @@ def _system_errors_named(entry: EngineEntry) -> Iterator[None]:
     try:
         yield
     except (OSError, BrokenProcessPool) as error:
-        reason = error.__cause__ or error  # of a pool that could not start its process
+        cause = error.__cause__ or error  # of a pool that could not start its process
+        reason = getattr(cause, "strerror", None) or cause
         raise DropspinError(
-            f"the system cannot start a process for {entry.label}: {getattr(reason, 'strerror', None) or reason}; shared memory (/dev/shm) must be writable "
-            "and not full, and the limits of processes and open files must not be reached (ulimit -u, ulimit -n)."
+            f"the system cannot start a process for {entry.label}: {reason}; shared memory (/dev/shm) must be writable and not full, and the "
+            "limits of processes and open files must not be reached (ulimit -u, ulimit -n)."
         ) from None
 
 

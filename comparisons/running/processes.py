@@ -198,8 +198,8 @@ def _system_errors_named(entry: EngineEntry) -> Iterator[None]:
         cause = error.__cause__ or error  # of a pool that could not start its process
         reason = getattr(cause, "strerror", None) or cause
         raise DropspinError(
-            f"the system cannot start a process for {entry.label}: {reason}; shared memory (/dev/shm) must be writable and not full, and the "
-            "limits of processes and open files must not be reached (ulimit -u, ulimit -n)."
+            f"the system cannot start a process for {entry.label}: {reason}; shared memory (/dev/shm) must be writable and not full, and "
+            "the limits of processes and open files must not be reached (ulimit -u, ulimit -n)."
         ) from None
 
 

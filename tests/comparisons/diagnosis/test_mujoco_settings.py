@@ -110,7 +110,7 @@ def test_of_several_settings_of_the_compiler_the_one_that_changes_a_value_is_nam
 
 @pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass' is deprecated")
 def test_all_settings_of_the_compiler_that_act_on_a_mass_by_density_are_named_the_largest_effect_first(tmp_path):
-    """MuJoCo raises the mass of another body from 0.02 to 0.1 kg, then scales both to 3 kg: 2.94 kg without the first, 1 without the second."""
+    """MuJoCo raises the mass of another body from 0.02 to 0.1 kg, then scales both to 3 kg: 2.94 kg without the first, 1 without both."""
     other = '<body pos="0 0 2"><joint/><inertial pos="0 0 0" mass=".02" diaginertia="1e-4 1e-4 1e-4"/></body>'
     head = '<compiler boundmass="0.1" settotalmass="3"/>'
     body = body_of(tmp_path, FREE.format(BOX) + other, head=head, name="b")

@@ -26,6 +26,7 @@ from dropspin.comparisons.running.timing import (
     timings_in_flight,
 )
 from dropspin.scenarios import Scenario
+from dropspin.scenarios.state import Array
 
 FIRST_STEPS, FIRST_STEPS_OF_A_BATCH = 16, 4
 LONG_ENOUGH = 2e-3
@@ -38,6 +39,8 @@ BATCH_SECONDS = 0.02
 LONGEST_BATCH = 4.0
 """The largest wall time of a timing of a batch on a floor [s]."""
 MEMORY_STEPS = 10
+ALIKE, ROUNDING = 1e-3, 64
+"""Largest difference of a batch from a single simulation: a share of how far that has moved, and so many eps of the largest number."""
 PROCESS = Path("/proc/self")
 LOAD = Path("/proc/loadavg")
 
@@ -65,9 +68,10 @@ def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
 
 
 def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], worlds: int) -> list[float]:
-    """Wall time per simulated second and world [s/s] of a batch at each time step, as by `cost`; NaN if its states are not finite.
+    """Wall time per simulated second and world [s/s] of a batch at each time step, as by `cost`.
 
-    With a floor, runs that are too long, judged by their first steps, are not timed.
+    NaN if its states are not finite, or after the first steps not those of a single simulation. With a floor, runs that are too long,
+    judged by their first steps, are not timed.
 
     Raises:
         Breakdown: The engine cannot simulate batches.
@@ -77,12 +81,23 @@ def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], w
         timed, steps = partial(_finite, entry.adapter, [scene] * worlds, dt), scene.steps(dt)
         times.append(math.nan)
         with suppress(Diverged):
-            timed(1)  # compiles
+            _verify_alike(entry, scene, timed(1).state, time_steps(entry.adapter, scene, dt, 1).state)  # and compile
             if scene.floor is None:
                 times[-1] = time_per_step(timings_in_flight(timed, FIRST_STEPS_OF_A_BATCH, 1, BATCH_SECONDS))
             elif timed(FIRST_STEPS).stepping * steps <= LONGEST_BATCH * FIRST_STEPS:
                 times[-1] = time_per_step([timed(steps)])
     return [per_step / (dt * worlds) for dt, per_step in zip(dts, times, strict=True)]
+
+
+def _verify_alike(entry: EngineEntry, scene: Scenario, batch: Array, alone: Array) -> None:
+    """Compare the states of a batch, (size, 13), with that of a single simulation, (13,), over how far that has moved.
+
+    Raises:
+        Diverged: They differ.
+    """
+    rounding = ROUNDING * np.finfo(entry.adapter.precision).eps * np.abs(alone).max()
+    if not np.abs(batch - alone).max() <= ALIKE * np.abs(alone - scene.initial_state).max() + rounding:
+        raise Diverged("the states of the batch are not those of a single simulation")
 
 
 def _finite(*args: Any) -> TimedSteps:

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support.accuracy_options import InnerStep
-from support.engines import Exact, ExactSimulation
+from support.engines import Exact, ExactSimulation, Together
 
 from dropspin.comparisons.engines.base import BatchSimulation, Diverged
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
@@ -146,18 +146,17 @@ class CostlyCalls(Exact):
         return made
 
     def prepare_batch(self, members, dt):
-        return CostlyBatch(self, members)
+        return CostlyBatch(self, members, dt)
 
 
-class CostlyBatch(BatchSimulation):
-    def __init__(self, engine, members, substeps=1):
-        self._engine, self._members, self._substeps = engine, members, substeps
+class CostlyBatch(Together):
+    def __init__(self, engine, members, dt, substeps=1):
+        super().__init__([Exact.prepare(engine, member, dt) for member in members])
+        self._pass_time = lambda steps: engine.pass_time(steps * substeps * len(members))
 
     def advance(self, steps):
-        self._engine.pass_time(steps * self._substeps * len(self._members))
-
-    def states(self):
-        return np.array([member.initial_state for member in self._members])
+        super().advance(steps)
+        self._pass_time(steps)
 
 
 @pytest.mark.parametrize("dt", [1e-2, 1e-3])
@@ -189,7 +188,7 @@ class Substeps(CostlyCalls):
     """Divides each step into equal ones of 1 ms."""
 
     def prepare_batch(self, members, dt):
-        return CostlyBatch(self, members, round(1e3 * dt))
+        return CostlyBatch(self, members, dt, round(1e3 * dt))
 
 
 def test_cost_per_world_of_an_engine_that_divides_its_steps(monkeypatch):
@@ -197,6 +196,22 @@ def test_cost_per_world_of_an_engine_that_divides_its_steps(monkeypatch):
     monkeypatch.setattr(timing.time, "perf_counter", lambda: CostlyCalls.clock)
     entry = EngineEntry("substeps", Substeps())
     assert costs.costs_per_world(entry, SPIN, [1e-2, 1e-3], 4) == pytest.approx([STEP / 1e-3] * 2, rel=1e-9)
+
+
+class Idle(Together):
+    """Takes no step."""
+
+    def advance(self, steps):
+        pass
+
+
+@pytest.mark.parametrize(("batch", "has_cost"), [(Together, True), (Idle, False)])
+def test_batch_whose_states_are_not_those_of_a_single_simulation_has_no_cost(batch, has_cost):
+    def prepare_batch(self, members, dt):
+        return batch([self.prepare(member, dt) for member in members])
+
+    engine = type("Batched", (Exact,), {"name": "batched", "prepare_batch": prepare_batch})()
+    assert np.isfinite(costs.costs_per_world(EngineEntry("batched", engine), SPIN, [1e-2], 4)).all() == has_cost
 
 
 @pytest.fixture(scope="module")

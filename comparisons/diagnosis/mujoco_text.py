@@ -1,7 +1,7 @@
 """A body of an MJCF or URDF file in the file's own words: its settings with their lines, and what MuJoCo changes or does not use."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -102,7 +102,8 @@ class BodyText:
         if body is None:
             return found
         places: dict[str, list[Element]] = {"gravcomp": self._bodies} | dict.fromkeys(OF_JOINT, self._joint)
-        places |= dict.fromkeys(("margin", "solref", "solimp", "friction", "condim", "contype", "conaffinity"), self._of_contact)
+        places |= dict.fromkeys(("margin", "contype", "conaffinity"), self._elements(self._in_contact))
+        places |= dict.fromkeys(("solref", "solimp", "friction", "condim"), self._elements(self._of_priority))
         inertial = next(iter(children_of(body, "inertial")), None)
         written = {name: [mjcf_setting(one, name) for one in elements] for name, elements in places.items()}
         if inertial is not None:
@@ -119,11 +120,20 @@ class BodyText:
         """The joint of the body."""
         return [] if self.element is None else children_of(self.element, "joint", "freejoint")[:1]
 
-    @cached_property
-    def _of_contact(self) -> list[Element]:
-        """What sets the contact: the pairs, the geometries that touch, or all if none does, and the one that the body lands on."""
+    @property
+    def _in_contact(self) -> list[int]:
+        """The geometries that touch, or all if none does, and the one that the body lands on."""
         touching = list(self._contacts) or [geom for geom, body in enumerate(self._model.geom_bodyid) if body in self._group]
-        geoms = touching if self._surface is None else [*touching, self._surface]
+        return touching if self._surface is None else [*touching, self._surface]
+
+    @property
+    def _of_priority(self) -> list[int]:
+        """Those of the largest priority, whose settings of the contact count alone."""
+        priorities = self._model.geom_priority[self._in_contact]
+        return [geom for geom, priority in zip(self._in_contact, priorities, strict=True) if priority == priorities.max()]
+
+    def _elements(self, geoms: Sequence[int]) -> list[Element]:
+        """The elements that set a contact: the pairs, and those of geometries."""
         return [*self._pairs, *filter(None, (geom_element(self._file, geom) for geom in geoms))]
 
     @cached_property
@@ -166,7 +176,7 @@ class BodyText:
     def _contact_of_geoms(self, changes: Mapping[str, object]) -> list[Setting]:
         """The geometries with other settings of the contact: margins add, and of the others those of the larger priority count alone."""
         if "margin" in changes:
-            return [geom.changed({"margin": 0}) for geom in self._of_contact if mjcf_setting(geom, "margin") is not None]
+            return [geom.changed({"margin": 0}) for geom in self._elements(self._in_contact) if mjcf_setting(geom, "margin") is not None]
         found = []
         for number, contact in self._contacts.items():
             kept = {"friction": contact["friction"][OF_GEOM], "condim": np.array([contact["condim"]])}
@@ -203,17 +213,18 @@ class BodyText:
                 yield self._changed("inertia", f"{made}: moments {digits(has.tolist())} kg m²")
         yield from self._miscounted()
         yield from self._visual()
-        if condim and (
+        if condim == 1 and "friction" in settings:
+            yield "friction", settings["friction"], "not used: condim is 1"
+        elif condim and (
             unused := [name for name, (place, least, most) in FURTHER.items() if condim < least and self._friction(place) > most]
         ):
             needed = " and ".join(f"{name} friction needs condim {FURTHER[name][1]}" for name in unused)
             yield "friction", settings["friction"], f"used in part: {needed}, and condim is {condim}"
         if self._file.is_urdf:
             element = self.element
-            yield from self._without_inertial()
             if self._model.body_weldid[self._head] == 0:
                 yield "base", Setting("the root link") if element is None else element.words, "welded to the world"
-            yield from self._unread()
+            yield from self._of_links()
 
     def _friction(self, place: int) -> float:
         """A coefficient of friction that the file has; 0 if it has none in this place."""
@@ -236,28 +247,18 @@ class BodyText:
             made = f'counted as {has.mass:.4g} kg by default; its volume has {exact.mass:.4g} kg, which inertia="exact" gives'
             yield "mesh", meshes[0].words if meshes else Setting("a mesh"), made
 
-    @cached_property
-    def _links(self) -> dict[int, Element]:
-        """The links of a URDF file of the body and what is welded to it, by the numbers of the bodies."""
+    def _of_links(self) -> Iterator[Ignored]:
+        """Of the links in a URDF file: a mass that follows from the geometries, and settings of contacts."""
         links = {link.attributes.get("name", ""): link for link in self._file.source.every("link")}
-        names = {number: mujoco.mj_id2name(self._model, BODY, number) for number in self._group}
-        return {number: links[name] for number, name in names.items() if name in links}
-
-    def _unread(self) -> Iterator[Ignored]:
-        """The settings of contacts in a URDF file."""
-        for number, link in self._links.items():
-            of_link = "" if number == self._head else f" of {link.attributes['name']}"
+        for number in self._group:
+            if (link := links.get(name := mujoco.mj_id2name(self._model, BODY, number))) is None:
+                continue
+            if (mass := self._model.body_mass[number]) > 0.0 and next(link.every("inertial"), None) is None:
+                words = Setting(f"no inertial in link {name}", link.file, link.line)
+                yield "inertial", words, f"missing: the mass is {mass:.4g} kg, that of the geometries at the default density"
             unread = [found for tag, value in IN_FORCE.items() for found in link.every(tag) if found.number("value", value) != value]
             for found in (*unread, *used_by_neither_engine(link)):
-                yield f"{found.tag}{of_link}", found.words, "not read"
-
-    def _without_inertial(self) -> Iterator[Ignored]:
-        """The links of a URDF file, of the body and what is welded to it, of which the mass follows from the geometries."""
-        for number, link in self._links.items():
-            mass = self._model.body_mass[number]
-            if mass > 0.0 and next(link.every("inertial"), None) is None:
-                words = Setting(f"no inertial in link {link.attributes['name']}", link.file, link.line)
-                yield "inertial", words, f"missing: the mass is {mass:.4g} kg, that of the geometries at the default density"
+                yield found.tag + ("" if number == self._head else f" of {name}"), found.words, "not read"
 
     def _visual(self) -> Iterator[Ignored]:
         """Geometries that collide with nothing, and count in the mass by their density."""

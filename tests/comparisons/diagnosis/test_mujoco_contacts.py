@@ -59,6 +59,21 @@ def test_plane_counts_and_not_what_else_of_the_world_a_body_collides_with(tmp_pa
     assert [finding for answer in targets for finding in answer.findings] == []
 
 
+def test_settings_of_a_contact_are_those_of_the_larger_priority(tmp_path):
+    """MuJoCo raises the time constant of the table, not that of the cube, and has its friction."""
+    table = '<geom name="t" type="plane" size="1 1 .1" pos="0 0 .2" priority="2" solref="0.002 1" friction=".3 .05 .01"/>'
+    cube = FREE.format('<geom type="box" size=".1 .1 .1" mass="1" solref="0.02 1" friction="0.9 .01 .001"/>')
+    ignored = {name: (setting.text, made) for name, setting, made in body_of(tmp_path, table + cube, on="t").facts.ignored}
+    assert ignored["solref"] == ('solref="0.002 1"', "raised to a time constant of 0.004 s, two time steps")
+    assert ignored["friction"][0] == 'friction=".3 .05 .01"'
+
+
+def test_friction_of_a_contact_without_friction_is_not_used(tmp_path):
+    ball = FREE.format('<geom size=".1" mass="1" condim="1" priority="1" friction="0.9 .01 .001"/>')
+    made = [made for name, _, made in body_of(tmp_path, ball).facts.ignored if name == "friction"]
+    assert made == ["not used: condim is 1"]
+
+
 def test_both_coefficients_of_a_pair_are_judged(tmp_path):
     """MuJoCo's own slides along the two axes take 32 and 64 mm: v²/2µg with 0.4 and 0.2."""
     body = '<body name="b" pos="0 0 1"><freejoint/><geom name="g" type="box" size=".1 .1 .1"/></body>'

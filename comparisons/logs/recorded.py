@@ -117,23 +117,25 @@ def of_rates(flights: Flights) -> Iterator[Finding]:
     each, in_world = zip(flights.found, flights.rotations, strict=True), flights.log.header.spin_frame == "world"
     rated = [pair for pair in each if pair[0].toss.angular_velocity is not None or pair[0].toss.velocity is not None]
     spun = [(flight, flight.toss.angular_velocity, rotor(flight.t)[1]) for flight, rotor in rated]
-    frame = Cause("spin frame", keys={"spin_frame": "body" if in_world else "world"})
+    frame, upright = Cause("spin frame", keys={"spin_frame": "body" if in_world else "world"}), np.array(UPRIGHT[flights.log.header.up])
     if flights.turning.noise.white < UNTRACKED:
-        yield from _of_column("spin", spun, flights.turning.noise.white, frame)
+        yield from _of_column("spin", spun, flights.turning.noise.white, frame, upright)
     moved = [(flight, flight.toss.velocity, _velocities(flight, rates, flights.log.header)) for flight, _, rates in spun]
-    yield from _of_column("velocity", moved, flights.moving.noise.white, Cause("velocity frame"))
+    yield from _of_column("velocity", moved, flights.moving.noise.white, Cause("velocity frame"), upright)
 
 
 def _velocities(flight: Flight, spins: Array, header: Header) -> Array:
-    """Velocities in the rows of a flight [m/s]: of the centre of mass, or of the tracked point if the recorded ones are nearer to these."""
+    """Velocities in the rows of a flight [m/s]: of the centre of mass, or of the tracked point if recorded speeds are nearer to these."""
     arms = rotate(flight.toss.orientation[flight.rows], header.tracked_from_centre)
     _, first, second = np.polynomial.polynomial.polyfit(flight.t, flight.toss.position[flight.rows] - arms, 2)
     centre = np.asarray(first + 2.0 * flight.t[:, np.newaxis] * second)
     given = centre if flight.toss.velocity is None else flight.toss.velocity[flight.rows]
-    return min(centre, centre + cross(spins, arms), key=lambda exact: float(np.median(length(given - exact))))
+    return min(centre, centre + cross(spins, arms), key=lambda exact: float(np.median(np.abs(length(given) - length(exact)))))
 
 
-def _of_column(kind: str, columns: Sequence[tuple[Flight, Array | None, Array]], white: float, frame: Cause) -> Iterator[Finding]:
+def _of_column(
+    kind: str, columns: Sequence[tuple[Flight, Array | None, Array]], white: float, frame: Cause, upright: Array
+) -> Iterator[Finding]:
     """Of recorded rates that differ from those of the motion: a finding for each of the fewest causes with which they agree.
 
     Args:
@@ -141,6 +143,7 @@ def _of_column(kind: str, columns: Sequence[tuple[Flight, Array | None, Array]],
         columns: Each flight with its recorded rates, if any, and with those of the motion in its rows.
         white: The white noise of the poses.
         frame: The cause that the rates are in the other frame.
+        upright: The rotation from the axes of the recording, a quaternion.
     """
     known = [(flight, given[flight.rows], exact, given[flight.first : flight.end]) for flight, given, exact in columns if given is not None]
     if not known:
@@ -159,7 +162,8 @@ def _of_column(kind: str, columns: Sequence[tuple[Flight, Array | None, Array]],
     if explained(given, 1.0):
         return
     found: list[tuple[Cause | None, ...]] = []
-    for in_frame, rates in (((), given), ((frame,), rotate(turned, given)), ((frame,), unrotate(turned, given))):
+    of_body, of_world = rotate(turned, unrotate(upright, given)), rotate(upright, unrotate(turned, given))  # if they were of the other
+    for in_frame, rates in (((), given), ((frame,), of_body), ((frame,), of_world)):
         factor = float(np.sum(rates * exact)) / (float(np.sum(exact**2)) or 1.0)
         is_scaled = abs(abs(factor) - 1.0) > ALLOWED
         if factor != 0.0 and explained(rates, factor):

@@ -12,7 +12,7 @@ from dropspin.comparisons.logs import check as checks
 from dropspin.comparisons.logs.check import CENTRES, RATIOS, Check, log_check
 from dropspin.comparisons.logs.flight import Flight
 from dropspin.comparisons.logs.flights import flights_of
-from dropspin.comparisons.logs.header import Header
+from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.log import Finding, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression
 from dropspin.comparisons.logs.recorded import of_frames, of_rates
@@ -341,6 +341,29 @@ def test_each_error_of_recorded_spins_is_named_and_no_unit_that_does_not_explain
     assert causes(np.degrees) == [("spin frame",), ("degrees",)]
     assert causes(lambda spin: -1e3 * spin) == [("spin frame",), ("sign of the spin",), ("unit of the spin",)]
     assert causes(lambda spin: 10.0 * spin[:, [1, 2, 0]]) == [()]
+
+
+@pytest.mark.parametrize("up", ["y", "z", "-x"])
+def test_rates_in_the_frame_of_the_body_are_named_whatever_axis_is_up(up: str) -> None:
+    """And whether the centre of mass moves with the recorded velocities or, as here, another point."""
+    point, upright = (0.04, 0.01, -0.02), np.array(UPRIGHT[up])
+    log = with_rates(made(1, 4, (1e-4, 1e-3), spin=10.0, offset=point, header={"tracked_point": point, "up": up}).log)
+    flights = flights_of(log, np.array([0.0, -9.81, 0.0]))
+    assert flights is not None
+
+    def found(frame: str, **change: Callable[[Toss], Any]) -> list[tuple[str, list[str]]]:
+        spun = changed(replace(log, header=log.header.model_copy(update={"spin_frame": frame})), **change)
+        findings = of_rates(replace(flights, log=spun, flights=tuple(_moved(flights.flights, spun))))
+        return [(finding.kind, [cause.name for cause in finding.causes]) for finding in findings]
+
+    assert found("world") == []
+    in_body = {
+        name: lambda toss, name=name: rotate(upright, unrotate(toss.orientation, getattr(toss, name)))
+        for name in ("angular_velocity", "velocity")
+    }
+    assert found("world", **in_body) == [("spin", ["spin frame"]), ("velocity", ["velocity frame"])]
+    in_world = {"angular_velocity": lambda toss: rotate(toss.orientation, unrotate(upright, toss.angular_velocity))}
+    assert found("body", **in_world) == [("spin", ["spin frame"])]
 
 
 def _moved(flights: Sequence[Flight | None], log: Log) -> Iterator[Flight | None]:

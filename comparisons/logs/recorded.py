@@ -125,12 +125,13 @@ def of_rates(flights: Flights) -> Iterator[Finding]:
 
 
 def _velocities(flight: Flight, spins: Array, header: Header) -> Array:
-    """Velocities in the rows of a flight [m/s]: of the centre of mass, or of the tracked point if recorded speeds are nearer to these."""
+    """Velocities in the rows of a flight [m/s]: of the centre of mass, or of the tracked point if recorded speeds, in any unit, are."""
     arms = rotate(flight.toss.orientation[flight.rows], header.tracked_from_centre)
     _, first, second = np.polynomial.polynomial.polyfit(flight.t, flight.toss.position[flight.rows] - arms, 2)
     centre = np.asarray(first + 2.0 * flight.t[:, np.newaxis] * second)
     given = centre if flight.toss.velocity is None else flight.toss.velocity[flight.rows]
-    return min(centre, centre + cross(spins, arms), key=lambda exact: float(np.median(np.abs(length(given) - length(exact)))))
+    speeds = length(given)
+    return max(centre, centre + cross(spins, arms), key=lambda exact: float(speeds @ length(exact)) / float(np.linalg.norm(exact)))
 
 
 def _of_column(

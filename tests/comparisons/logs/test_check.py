@@ -362,6 +362,8 @@ def test_rates_in_the_frame_of_the_body_are_named_whatever_axis_is_up(up: str) -
         for name in ("angular_velocity", "velocity")
     }
     assert found("world", **in_body) == [("spin", ["spin frame"]), ("velocity", ["velocity frame"])]
+    in_feet = found("world", velocity=lambda toss: toss.velocity / 0.3048)
+    assert in_feet == [("velocity", ["unit of the velocity"])]
     in_world = {"angular_velocity": lambda toss: rotate(toss.orientation, unrotate(upright, toss.angular_velocity))}
     assert found("body", **in_world) == [("spin", ["spin frame"])]
 

@@ -232,7 +232,8 @@ class MuJoCoBody(LooseBody):
         """The depth of a body that rests on one point, or on several that share its weight, below the surface [m]; NaN of others."""
         contact, armature = self._alone.contact, self._alone.armature
         is_central = not (armature and self._offset.any()) and self._lifted < 1.0 and not np.ptp(self._model.body_gravcomp[1:])
-        points = self._points() if contact is not None and is_central else 0
+        is_still = not self._model.opt.wind.any()  # the air moves no body at rest
+        points = self._points() if contact is not None and is_central and is_still else 0
         if not points or contact is None:
             return np.nan
         mass = self._properties.mass

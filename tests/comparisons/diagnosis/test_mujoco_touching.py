@@ -88,6 +88,13 @@ def test_body_that_does_not_fall_has_answers_that_say_so(tmp_path, gravcomp):
     assert math.isnan(body.facts.rest_depth)
 
 
+@pytest.mark.parametrize(("wind", "is_known"), [("0 0 0", True), ("2 0 0", False)])
+def test_depth_at_rest_is_not_known_in_wind(tmp_path, wind, is_known):
+    """Air at rest exerts no force on a body at rest."""
+    depth = body_of(tmp_path, FREE.format(LID), f'density="1.2" wind="{wind}"').facts.rest_depth
+    assert math.isfinite(depth) == is_known
+
+
 def test_sleep_is_a_setting_with_a_remedy(tmp_path):
     flag = '<option sleep_tolerance="0.6"><flag sleep="enable"/></option>'
     body = body_of(tmp_path, FREE.format(LID), head=flag)

@@ -1,6 +1,6 @@
 """Faults planted into sound recordings: each is named, as alternatives where the motion cannot tell them apart."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -10,8 +10,7 @@ from support.tosses import BRICK, CUBE, made, turned
 
 from dropspin.comparisons.logs import check as checks
 from dropspin.comparisons.logs.check import CENTRES, RATIOS, Check, log_check
-from dropspin.comparisons.logs.flight import Flight
-from dropspin.comparisons.logs.flights import flights_of
+from dropspin.comparisons.logs.flights import Flights, flights_of
 from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.log import Finding, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression
@@ -311,29 +310,17 @@ def with_rates(log: Log, noise: float = 0.0) -> Log:
     return replace(log, tosses=tuple(tosses))
 
 
-@pytest.mark.parametrize(
-    ("change", "cause"),
-    [
-        (lambda toss: 100.0 * toss.velocity, "unit of the velocity"),
-        (lambda toss: -toss.velocity, "sign of the velocity"),
-        (lambda toss: unrotate(toss.orientation, toss.velocity), "velocity frame"),
-    ],
-)
-def test_velocities_that_are_not_those_of_the_positions_are_named(change: Callable[[Toss], Any], cause: str) -> None:
-    log = with_rates(sound())
-    assert log_check(log).findings == ()
-    found = only(log_check(changed(log, velocity=change)))
-    assert (found.kind, [one.name for one in found.causes]) == ("velocity", [cause])
-
-
-def test_each_error_of_recorded_spins_is_named_and_no_unit_that_does_not_explain_them() -> None:
+def test_each_error_of_recorded_rates_is_named_and_no_unit_that_does_not_explain_them() -> None:
     log = with_rates(sound(count=4, spin=10.0))
     check = log_check(log)
     assert check.findings == ()
+    found = only(log_check(changed(log, velocity=lambda toss: 100.0 * toss.velocity)))
+    assert (found.kind, [one.name for one in found.causes]) == ("velocity", ["unit of the velocity"])
+    found = only(replace(check, findings=tuple(rates_of(check.flights, velocity=lambda toss: -toss.velocity))))
+    assert (found.kind, [one.name for one in found.causes]) == ("velocity", ["sign of the velocity"])
 
     def causes(change: Callable[[Array], Array]) -> list[tuple[str, ...]]:
-        spun = changed(log, angular_velocity=lambda toss: change(unrotate(toss.orientation, toss.angular_velocity)))
-        found = list(of_rates(replace(check.flights, log=spun, flights=tuple(_moved(check.flights.flights, spun)))))
+        found = list(rates_of(check.flights, angular_velocity=lambda toss: change(unrotate(toss.orientation, toss.angular_velocity))))
         assert {finding.kind for finding in found} == {"spin"}
         assert [dict(cause.keys) for cause in found[0].causes] in ([], [{"spin_frame": "body"}])
         return [tuple(cause.name for cause in finding.causes) for finding in found]
@@ -341,6 +328,13 @@ def test_each_error_of_recorded_spins_is_named_and_no_unit_that_does_not_explain
     assert causes(np.degrees) == [("spin frame",), ("degrees",)]
     assert causes(lambda spin: -1e3 * spin) == [("spin frame",), ("sign of the spin",), ("unit of the spin",)]
     assert causes(lambda spin: 10.0 * spin[:, [1, 2, 0]]) == [()]
+
+
+def rates_of(flights: Flights, **changes: Callable[[Toss], Any]) -> Iterator[Finding]:
+    """The findings of rates in flights of tosses of which other parts are changed."""
+    log = changed(flights.log, **changes)
+    moved = [flight and replace(flight, toss=toss) for flight, toss in zip(flights.flights, log.tosses, strict=True)]
+    return of_rates(replace(flights, log=log, flights=tuple(moved)))
 
 
 @pytest.mark.parametrize("up", ["y", "z", "-x"])
@@ -351,9 +345,9 @@ def test_rates_in_the_frame_of_the_body_are_named_whatever_axis_is_up(up: str) -
     flights = flights_of(log, np.array([0.0, -9.81, 0.0]))
     assert flights is not None
 
-    def found(frame: str, **change: Callable[[Toss], Any]) -> list[tuple[str, list[str]]]:
-        spun = changed(replace(log, header=log.header.model_copy(update={"spin_frame": frame})), **change)
-        findings = of_rates(replace(flights, log=spun, flights=tuple(_moved(flights.flights, spun))))
+    def found(frame: str, **changes: Callable[[Toss], Any]) -> list[tuple[str, list[str]]]:
+        framed = replace(log, header=log.header.model_copy(update={"spin_frame": frame}))
+        findings = rates_of(replace(flights, log=framed), **changes)
         return [(finding.kind, [cause.name for cause in finding.causes]) for finding in findings]
 
     assert found("world") == []
@@ -366,12 +360,6 @@ def test_rates_in_the_frame_of_the_body_are_named_whatever_axis_is_up(up: str) -
     assert in_feet == [("velocity", ["unit of the velocity"])]
     in_world = {"angular_velocity": lambda toss: rotate(toss.orientation, unrotate(upright, toss.angular_velocity))}
     assert found("body", **in_world) == [("spin", ["spin frame"])]
-
-
-def _moved(flights: Sequence[Flight | None], log: Log) -> Iterator[Flight | None]:
-    """The flights with the columns of another recording."""
-    for flight, toss in zip(flights, log.tosses, strict=True):
-        yield flight and replace(flight, toss=toss)
 
 
 def test_orientations_of_a_body_that_turns_too_fast_for_the_frames_are_no_other_reading() -> None:

@@ -20,13 +20,14 @@ from dropspin.comparisons.measuring.tolerances import FEW_DRAWS, rounding, toler
 from dropspin.comparisons.running.engine_run import EngineRun
 from dropspin.comparisons.running.inputs import MOST_ROWS
 from dropspin.scenarios import Scenario, Trajectory, Truth
+from dropspin.scenarios.state import RATES
 from dropspin.scenarios.truths.flight import flight_states
 from dropspin.scenarios.truths.measured import tosses
 
 START_PHASES, QUICK_START_PHASES = 32, 8
 QUICK_TOSSES = 8
 REST_SHARE = 0.1
-"""A scene whose impacts are over in this share of its duration is about rest, not about impacts."""
+"""A scene whose body rests after impacts in this share of its duration is about rest, not about impacts."""
 QUICK_NOISE = 2.0
 """Factor on the noise of a mean over 8 start phases, within which the mean over 32 lies: over the catalogue, with Wang's method and MuJoCo
 at 3 and 8 ms, the largest difference is 1.4 times the noise, and 0.6 times for most metrics.
@@ -52,7 +53,7 @@ class StartPhase(NamedTuple):
 
 
 def number_of_phases(own: StartPhase, dt: float) -> int:
-    """The number of start phases: 1 if no impact comes after the first step [s], or if all are over in a tenth of the duration.
+    """The number of start phases: 1 if no impact comes after the first step [s], or if the body rests from a tenth of the duration on.
 
     Long scenes have fewer, so that they fit into memory. With a recording there are four of each toss.
     """
@@ -60,7 +61,10 @@ def number_of_phases(own: StartPhase, dt: float) -> int:
     if truth is not None and not truth.is_exact and scene.recording is not None:
         tosses = len(scene.recording.tosses)
         return PHASES_OF_TOSS * (min(tosses, QUICK_TOSSES) if quick else tosses)
-    if truth is None or not truth.events or truth.events[0].time <= dt or truth.events[-1].time < REST_SHARE * scene.duration:
+    if truth is None or not truth.events or truth.events[0].time <= dt:
+        return 1
+    end = np.array([scene.duration])
+    if truth.events[-1].time < REST_SHARE * scene.duration and truth.covers(end).all() and not truth(end).states[:, RATES].any():
         return 1
     return max(1, min(QUICK_START_PHASES if quick else START_PHASES, MOST_ROWS // scene.steps(dt)))
 

@@ -8,7 +8,7 @@ from dropspin.comparisons.measuring.batch import AT_ONCE, compute_states
 from dropspin.comparisons.measuring.states import States
 from dropspin.comparisons.running.engine_run import motions_from
 from dropspin.comparisons.running.entries import engine_entry
-from dropspin.comparisons.running.inputs import MOST_ROWS
+from dropspin.comparisons.running.inputs import MOST_ROWS, as_scene
 from dropspin.comparisons.running.perturbed_starts import PERTURBED_PHASES, changes_of_metrics, number_of_simulations
 from dropspin.comparisons.running.start_phases import START_PHASES, StartPhase, compare, number_of_phases, phases_at
 
@@ -65,6 +65,17 @@ def test_long_scenes_have_fewer_start_phases():
     assert (counts[1e-3], counts[2e-6]) == (START_PHASES, 1)
     assert 1 < counts[1e-4] < START_PHASES
     assert counts[1e-4] * scene.steps(1e-4) <= MOST_ROWS
+
+
+@pytest.mark.usefixtures("all_start_phases")
+@pytest.mark.parametrize(("restitution", "count"), [(0.5, START_PHASES), (0.0, 1)])
+def test_impact_after_which_a_body_flies_on_is_no_scene_about_rest(restitution, count):
+    """A fast ball whose only impact is at 3 % of the duration: whether it gets through a thin floor depends on the phase."""
+    ball = ds.load("drop-ball").model_dump(include={"body", "gravity"})
+    floor = {"restitution": restitution, "friction": "none", "half_extents": [1.0, 1.0], "thickness": 0.02}
+    start = {"position": [0.0, 1.0 + ball["body"]["radius"], 0.0], "velocity": [0.0, -30.0, 0.0]}
+    scene = as_scene({**ball, "name": "fast", "duration": 1.0, "start": start, "floor": floor})
+    assert number_of_phases(StartPhase(scene, ds.truth_for(scene)), 1e-3) == count
 
 
 @pytest.mark.usefixtures("all_start_phases")

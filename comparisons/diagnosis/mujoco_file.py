@@ -159,11 +159,14 @@ class MuJoCoFile:
     def unmodelled(self, body: int) -> list[str]:
         """What acts on a body in the model, and not on the body alone; and the keyframes in which it is turned."""
         model, joint = self.model, self.model.body_jntadr[body]
-        dofs = np.flatnonzero(np.isin(model.dof_bodyid, self.group(body)))
+        is_own = np.isin(np.arange(model.nbody), self.group(body))
+        dofs = np.flatnonzero(is_own[model.dof_bodyid])
         found = [words for words, columns in self._coupled.items() if np.isin(columns, dofs).any()]
+        is_free = joint >= 0 and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
+        found += ["joints"] * bool(joint >= 0 and not is_free or (is_own[model.body_parentid] & ~is_own).any())
         found += [words for field, words in UNMODELLED.items() if getattr(model, field, 0)]
         found += ["the stiffness of its joint"] * bool(joint >= 0 and np.any(model.jnt_stiffness[joint]))
-        if joint >= 0 and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
+        if is_free:
             turn = model.jnt_qposadr[joint] + np.arange(3, 7)
             turned = np.abs(model.key_qpos[:, turn] @ model.qpos0[turn]) < 1.0 - TURNED
             names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_KEY, int(key)) or str(key) for key in np.flatnonzero(turned)]

@@ -166,6 +166,7 @@ def test_root_of_a_urdf_is_welded_and_cut_loose(tmp_path):
     shape = '<collision><geometry><sphere radius="0.5"/></geometry></collision>'
     body = body_of(tmp_path, f'<robot name="r"><link name="ball">{link}{shape}</link></robot>', file="ball.urdf")
     assert [name for name, *_ in body.facts.ignored] == ["base", "restitution"]
+    assert body.facts.unmodelled == []
     assert body.facts.surface == "a plane with default settings"
     assert np.diag(body.facts.inertia) == pytest.approx([0.1] * 3)
 
@@ -177,7 +178,7 @@ def test_link_of_a_urdf_lands_on_the_plane_that_is_added_and_not_on_the_root(tmp
     joint = '<joint name="j" type="continuous"><parent link="base"/><child link="arm"/><origin xyz="0 0 .2"/><axis xyz="0 0 1"/></joint>'
     text = f'<robot name="r">{link.format("base")}{link.format("arm")}{joint}</robot>'
     facts = body_of(tmp_path, text, name="arm", file="arm.urdf").facts
-    assert (facts.surface, facts.unmodelled) == ("a plane with default settings", [])
+    assert (facts.surface, facts.unmodelled) == ("a plane with default settings", ["joints"])
     arm = '<body name="arm" pos="0 0 .2"><joint/><geom type="box" size=".1 .1 .1"/></body>'
     (tmp_path / "arm.xml").write_text(
         f'<mujoco><worldbody><body name="base"><geom name="foot" type="box" size=".1 .1 .1"/>{arm}</body></worldbody></mujoco>'

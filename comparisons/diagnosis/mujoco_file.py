@@ -163,7 +163,7 @@ class MuJoCoFile:
         dofs = np.flatnonzero(is_own[model.dof_bodyid])
         found = [words for words, columns in self._coupled.items() if np.isin(columns, dofs).any()]
         is_free = joint >= 0 and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
-        found += ["joints"] * bool(joint >= 0 and not is_free or (is_own[model.body_parentid] & ~is_own).any())
+        found += ["joints"] * bool((joint >= 0 and not is_free) or (is_own[model.body_parentid] & ~is_own).any())
         found += [words for field, words in UNMODELLED.items() if getattr(model, field, 0)]
         found += ["the stiffness of its joint"] * bool(joint >= 0 and np.any(model.jnt_stiffness[joint]))
         if is_free:

@@ -16,7 +16,7 @@ from dropspin.reports.html.report import html_report
 from dropspin.reports.junit import junit_xml
 from dropspin.reports.markdown import markdown
 from dropspin.reports.plots.figure import save_charts
-from dropspin.reports.plots.figures import CHARTS, report_charts
+from dropspin.reports.plots.run_charts import CHARTS, report_charts
 from dropspin.reports.stories.run import document, overview
 
 OURS = frozenset(

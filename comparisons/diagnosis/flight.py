@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import DECAY_TIME, KEPT, NOTEWORTHY, OF_FALLS, Answer, judged, vector_text
+from dropspin.comparisons.diagnosis.geometries import DIRECTIONS
 from dropspin.comparisons.diagnosis.loose_body import STILL, LooseBody, time_of_decay
-from dropspin.comparisons.diagnosis.parts import DIRECTIONS
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.scenarios.rotations import unrotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, UP, Array
-from dropspin.scenarios.truths.settings import terminal_speed
+from dropspin.scenarios.truths.damped_joint import terminal_speed
 
 FALL, TURN = 1.0, 1.0  # s
 SPEED = 10.0  # rad/s

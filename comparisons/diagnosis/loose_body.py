@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.parts import AXES, DIRECTIONS, VOLUMES, Part, Support
+from dropspin.comparisons.diagnosis.geometries import AXES, DIRECTIONS, VOLUMES, Part, Support
 from dropspin.comparisons.diagnosis.source import Ignored, Setting
 from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import SPIN, UP, Array
-from dropspin.scenarios.truths.settings import Resistance, fall, free_motion, spin_about_axis, time_constant
+from dropspin.scenarios.truths.damped_joint import Resistance, fall, free_motion, spin_about_axis, time_constant
 
 SETTLED = 3.0  # s
 STILL = np.zeros(3)

@@ -12,11 +12,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from dropspin.comparisons.diagnosis.geometries import VOLUMES
 from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of, overrides, plain
 from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, PLANE, MuJoCoFile, set_options
 from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, kind_of, mesh_of, quaternion, shape_of
-from dropspin.comparisons.diagnosis.parts import VOLUMES
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate

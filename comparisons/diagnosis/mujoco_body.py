@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
+from dropspin.comparisons.diagnosis.geometries import Part, at_point, lowest_of
 from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
@@ -16,7 +17,6 @@ from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of
 from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ENUMERATIONS, OPTIONS, PLANE, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
-from dropspin.comparisons.diagnosis.parts import Part, at_point, lowest_of
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.mujoco_model import contact
 from dropspin.comparisons.engines.mujoco_settings import CONTACT
@@ -25,7 +25,7 @@ from dropspin.comparisons.engines.options import spelled
 from dropspin.scenarios.rotations import multiply, rotate
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.surfaces import Floor
-from dropspin.scenarios.truths.settings import joint_damping
+from dropspin.scenarios.truths.damped_joint import joint_damping
 
 FLAT = 1e-9
 """Depth, relative to the size, at which contacts are counted."""

@@ -5,7 +5,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from dropspin.comparisons.diagnosis.parts import mesh_shape, solid
+from dropspin.comparisons.diagnosis.geometries import mesh_shape, solid
 from dropspin.comparisons.engines.mujoco_model import UPWARD
 from dropspin.scenarios.bodies import Shape
 from dropspin.scenarios.state import Array

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pybullet_data  # type: ignore[import-untyped]
 
+from dropspin.comparisons.diagnosis.geometries import Part, at_point, lowest_of
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
-from dropspin.comparisons.diagnosis.parts import Part, at_point, lowest_of
 from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Link, read_links
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.source import Ignored, Setting
@@ -27,7 +27,7 @@ from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import UnknownName
 from dropspin.scenarios.rotations import conjugate, multiply, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
-from dropspin.scenarios.truths.settings import Resistance, bullet_damping
+from dropspin.scenarios.truths.damped_joint import Resistance, bullet_damping
 
 STEP, GRAVITY, DAMPING = 1.0 / 240.0, 9.81, 0.04
 """Bullet's time step [s], the acceleration of gravity that is set, and Bullet's damping of a multibody, by velocity and by spin."""

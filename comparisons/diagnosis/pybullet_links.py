@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import digits
-from dropspin.comparisons.diagnosis.parts import Part, mesh_shape, solid
+from dropspin.comparisons.diagnosis.geometries import Part, mesh_shape, solid
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.source import Element, Ignored, Setting
 from dropspin.comparisons.diagnosis.urdf_file import UrdfFile, used_by_neither_engine

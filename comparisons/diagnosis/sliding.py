@@ -11,7 +11,7 @@ from dropspin.comparisons.diagnosis.landing import is_at_rest, tilt
 from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
 from dropspin.scenarios.rotations import rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
-from dropspin.scenarios.truths.settings import spin_about_axis
+from dropspin.scenarios.truths.damped_joint import spin_about_axis
 
 SLIDE = 0.5  # m/s
 LONGEST_SLIDE = 5.0  # m

@@ -23,7 +23,7 @@ from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
 from dropspin.comparisons.logs.log import Cause, Finding, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
-from dropspin.comparisons.logs.recorded import of_floor, of_frames, of_quaternions, of_rates, orders_of_axes
+from dropspin.comparisons.logs.recording_faults import of_floor, of_frames, of_quaternions, of_rates, orders_of_axes
 from dropspin.comparisons.logs.rest import rests
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.bodies.inertia import is_diagonal

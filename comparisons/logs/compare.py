@@ -16,14 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.logs.errors import KINDS, Kind, body_length, errors
-from dropspin.comparisons.logs.fit import LogFit
-from dropspin.comparisons.logs.flight import OFFSET
-from dropspin.comparisons.logs.flights import Flights, Start
-from dropspin.comparisons.logs.header import Header
-from dropspin.comparisons.logs.intervals import groups, interval_of_share, intervals_of_means
-from dropspin.comparisons.logs.log import Log
-from dropspin.comparisons.logs.replay import (
+from dropspin.comparisons.logs.continued_tosses import (
     Launches,
     flights_in,
     launches,
@@ -35,6 +28,13 @@ from dropspin.comparisons.logs.replay import (
     tracked,
     usable,
 )
+from dropspin.comparisons.logs.errors import KINDS, Kind, body_length, errors
+from dropspin.comparisons.logs.fit import LogFit
+from dropspin.comparisons.logs.flight import OFFSET
+from dropspin.comparisons.logs.flights import Flights, Start
+from dropspin.comparisons.logs.header import Header
+from dropspin.comparisons.logs.intervals import groups, interval_of_share, intervals_of_means
+from dropspin.comparisons.logs.log import Log
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits

@@ -11,11 +11,11 @@ import numpy as np
 from scipy.special import stdtrit
 
 from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.logs.continued_tosses import flights_in, of_each_engine
 from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, heights
 from dropspin.comparisons.logs.grids import FIRST_GRID, Problem, Profile, problem_of, profile_of
 from dropspin.comparisons.logs.intervals import LEVEL, expanded
 from dropspin.comparisons.logs.log import Log
-from dropspin.comparisons.logs.replay import flights_in, of_each_engine
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits

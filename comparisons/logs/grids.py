@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dropspin.comparisons.logs.continued_tosses import Launches, launches, poses, recorded, scene_of, time_step, tracked, usable
 from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.intervals import resamples
-from dropspin.comparisons.logs.replay import Launches, launches, poses, recorded, scene_of, time_step, tracked, usable
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown

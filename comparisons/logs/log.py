@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.logs.formats import FORMATS, ORIENTATION, POSITION, SPIN, VELOCITY, read_columns
 from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
-from dropspin.comparisons.running.belonging import is_uneven, missing_frames, problems_of_order
+from dropspin.comparisons.running.foreign_motions import is_uneven, missing_frames, problems_of_order
 from dropspin.scenarios.errors import DropspinError, UnknownName
 from dropspin.scenarios.loading import read_toml, with_mesh
 from dropspin.scenarios.rotations import conjugate, dot, length, multiply, rotate

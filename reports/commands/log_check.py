@@ -23,7 +23,7 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
     Exit code: 0 no finding, 1 a finding, 2 bad input.
     """
     from dropspin.comparisons.logs.check import log_check
-    from dropspin.comparisons.logs.replay import measured_scene
+    from dropspin.comparisons.logs.continued_tosses import measured_scene
     from dropspin.reports.stories.log_check import CheckedLog
     from dropspin.reports.study_files import write_scenes, write_toml, written_study
     from dropspin.scenarios import DropspinError

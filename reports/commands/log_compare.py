@@ -26,8 +26,8 @@ def log_compare_command(recording: str, fits: bool, output: str, json_output: bo
     """
     from dropspin.comparisons.logs.check import log_check
     from dropspin.comparisons.logs.compare import ENGINES, log_compare
+    from dropspin.comparisons.logs.continued_tosses import flights_in
     from dropspin.comparisons.logs.fit import log_fit
-    from dropspin.comparisons.logs.replay import flights_in
     from dropspin.reports.stories.log_compare import ComparedLog
     from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar

@@ -24,8 +24,8 @@ def log_fit_command(recording: str, output: str, json_output: bool, **options: A
     Give corrected.toml, which dropspin log check writes. The default engines are mujoco and wang[contact=sequential,law=coulomb].
     """
     from dropspin.comparisons.logs.check import log_check
+    from dropspin.comparisons.logs.continued_tosses import flights_in
     from dropspin.comparisons.logs.fit import log_fit
-    from dropspin.comparisons.logs.replay import flights_in
     from dropspin.reports.stories.log_fit import FittedLog
     from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar

@@ -31,7 +31,7 @@ def replay_command(
     from dropspin.comparisons.results.folder import written_whole
     from dropspin.comparisons.results.store import load_results
     from dropspin.reports.html.replay import replay_page
-    from dropspin.reports.plots.figures import time_charts
+    from dropspin.reports.plots.run_charts import time_charts
     from dropspin.reports.replay import replay_of
     from dropspin.reports.replay.clip import write_clip
     from dropspin.reports.terminal.progress import share_bar

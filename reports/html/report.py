@@ -22,7 +22,7 @@ from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.plots.colours import engine_colours, human_label
 from dropspin.reports.plots.convergence import PREDICTED
-from dropspin.reports.plots.figures import CHARTS
+from dropspin.reports.plots.run_charts import CHARTS
 from dropspin.reports.replay import as_data, replay_of
 from dropspin.reports.stories import numbers
 from dropspin.reports.stories.contacts import worst_contacts

@@ -35,8 +35,8 @@ from dropspin.reports.plots.over_time import over_time as over_time
 from dropspin.reports.plots.over_time import plot_over_time as plot_over_time
 from dropspin.reports.plots.over_time import quantities as quantities
 from dropspin.reports.plots.over_time import tilt as tilt
-from dropspin.reports.plots.spins import plot_polhode as plot_polhode
-from dropspin.reports.plots.spins import polhode as polhode
+from dropspin.reports.plots.polhodes import plot_polhode as plot_polhode
+from dropspin.reports.plots.polhodes import polhode as polhode
 from dropspin.reports.plots.style import style as style
 from dropspin.reports.plots.tradeoff import error_over_cost as error_over_cost
 from dropspin.reports.plots.tradeoff import plot_tradeoff as plot_tradeoff

@@ -19,12 +19,12 @@ from dropspin.scenarios.truths.coulomb_turn import coulomb_turn
 from dropspin.scenarios.truths.flight import flight
 from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, LAWS, Law, law_of
 from dropspin.scenarios.truths.measured import measured
-from dropspin.scenarios.truths.near import until_near
 from dropspin.scenarios.truths.point_contact import point_contact
 from dropspin.scenarios.truths.rocking import rocking
 from dropspin.scenarios.truths.rolling import rolling
 from dropspin.scenarios.truths.slipping import slipping
 from dropspin.scenarios.truths.truth import Impact, Truth
+from dropspin.scenarios.truths.until_obstacle import until_near
 
 __all__ = ["LAWS", "Impact", "Law", "Truth", "other_laws", "reference_for", "truth_for"]
 

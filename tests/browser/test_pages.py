@@ -21,7 +21,7 @@ from support.scenes import with_few_members
 import dropspin as ds
 from dropspin.reports.document import Charts, Document, Heading, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
-from dropspin.reports.plots.figures import CHARTS
+from dropspin.reports.plots.run_charts import CHARTS
 from dropspin.reports.replay import as_data, replay_of
 from dropspin.reports.stories.run import overview
 from dropspin.scenarios.rotations import about, angle_between_orientations, multiply

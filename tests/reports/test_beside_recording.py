@@ -8,7 +8,7 @@ import pytest
 from dropspin.comparisons.running.run import run
 from dropspin.reports.html.report import html_report
 from dropspin.reports.markdown import markdown
-from dropspin.reports.plots.figures import report_charts
+from dropspin.reports.plots.run_charts import report_charts
 from dropspin.reports.replay import as_data, replay_of
 from dropspin.reports.stories.run import document, overview
 from dropspin.reports.stories.show import scene_rows

@@ -11,8 +11,8 @@ from dropspin.comparisons.results.store import save
 from dropspin.comparisons.results.table import as_table
 from dropspin.reports import plots
 from dropspin.reports.plots.colours import engine_styles
-from dropspin.reports.plots.figures import ensemble_charts
-from dropspin.reports.plots.spins import energy_ellipsoid, polhode_paths
+from dropspin.reports.plots.polhodes import energy_ellipsoid, polhode_paths
+from dropspin.reports.plots.run_charts import ensemble_charts
 from dropspin.reports.plots.style import plain, power
 from dropspin.scenarios import Trajectory, members, truth_for
 from dropspin.scenarios.mechanics import energy, kinetic_energy

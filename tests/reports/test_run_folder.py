@@ -23,8 +23,8 @@ from dropspin.reports import run_folder
 from dropspin.reports.html.replay import replay_page
 from dropspin.reports.html.report import html_report
 from dropspin.reports.markdown import markdown
-from dropspin.reports.plots import figures
-from dropspin.reports.plots.figures import report_charts
+from dropspin.reports.plots import run_charts
+from dropspin.reports.plots.run_charts import report_charts
 from dropspin.reports.replay import replay_of
 from dropspin.reports.run_folder import write_report
 from dropspin.reports.stories.findings import profile_comparisons
@@ -456,6 +456,6 @@ def test_a_run_of_many_scenes_has_plots_of_those_that_fail(results, monkeypatch)
     failing = replace(results, table=results.table.assign(verdict=np.where(results.table["scene"] == last, "failed", "passed")))
     assert list(report_charts(failing)) == list(results.scenes)
     assert "scenes have plots" not in html_report(failing, overview(failing), report_charts(failing))
-    monkeypatch.setattr(figures, "MOST_SCENES", 1)
+    monkeypatch.setattr(run_charts, "MOST_SCENES", 1)
     assert list(report_charts(failing)) == [last]
     assert "1 of 3 scenes have plots" in html_report(failing, overview(failing), report_charts(failing))

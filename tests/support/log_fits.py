@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dropspin.comparisons.logs.continued_tosses import STEPS_PER_FRAME, Launches, poses, scene_of
 from dropspin.comparisons.logs.flights import Flights, Start
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.log import Log, Toss
 from dropspin.comparisons.logs.noise import Noise, Regression
-from dropspin.comparisons.logs.replay import STEPS_PER_FRAME, Launches, poses, scene_of
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.scenarios.rotations import multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY

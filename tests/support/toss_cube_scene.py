@@ -7,8 +7,8 @@ The header is corrected by what `dropspin log check toss-cube` finds: lengths th
 
 from dataclasses import replace
 
+from dropspin.comparisons.logs.continued_tosses import flights_in, measured_scene
 from dropspin.comparisons.logs.log import load_log
-from dropspin.comparisons.logs.replay import flights_in, measured_scene
 from dropspin.scenarios.loading import CATALOGUE
 from dropspin.scenarios.recording import Recording
 

@@ -15,7 +15,7 @@ from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
 from dropspin.comparisons.diagnosis.sliding import slide
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.state import POSITION, UP
-from dropspin.scenarios.truths.settings import fall as damped_fall
+from dropspin.scenarios.truths.damped_joint import fall as damped_fall
 
 
 def test_healthy_ball_has_no_finding(tmp_path):

@@ -14,7 +14,7 @@ from dropspin.comparisons.diagnosis.landing import IMPACTS, impact, rest
 from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
 from dropspin.comparisons.diagnosis.remedies import answers_to
 from dropspin.comparisons.diagnosis.sliding import slide
-from dropspin.scenarios.truths.settings import time_constant
+from dropspin.scenarios.truths.damped_joint import time_constant
 
 HALF = (0.1, 0.05, 0.03)
 MOMENTS = [sum(h * h for j, h in enumerate(HALF) if j != axis) / 3.0 for axis in range(3)]  # of 1 kg

@@ -14,7 +14,7 @@ from dropspin.comparisons.logs.flights import Flights, flights_of
 from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.log import Finding, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression
-from dropspin.comparisons.logs.recorded import of_frames, of_rates
+from dropspin.comparisons.logs.recording_faults import of_frames, of_rates
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
 from dropspin.scenarios.state import Array

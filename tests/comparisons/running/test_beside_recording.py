@@ -10,7 +10,7 @@ from support import log_fits
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.judging.convergence import Convergence, beside_recording
 from dropspin.comparisons.judging.error_budget import ErrorBudget
-from dropspin.comparisons.logs.replay import measured_scene
+from dropspin.comparisons.logs.continued_tosses import measured_scene
 from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.regressions.baseline import Baseline

@@ -12,9 +12,9 @@ from support.cli import TERMINAL, assert_refused, dropspin
 from support.tosses import BRICK, made
 
 from dropspin.comparisons.logs.check import TossFacts, Value
+from dropspin.comparisons.logs.continued_tosses import flights_in
 from dropspin.comparisons.logs.fit import Estimate, LogFit
 from dropspin.comparisons.logs.log import Cause, Finding, load_log
-from dropspin.comparisons.logs.replay import flights_in
 from dropspin.reports.stories.log_check import SPINNING, CheckedLog
 from dropspin.reports.stories.log_findings import sentence
 from dropspin.reports.stories.log_fit import FittedLog
@@ -111,7 +111,7 @@ def test_check_is_kept_if_scenes_cannot_start_above_the_floor(recording, monkeyp
     def below(flights):
         raise DropspinError("toss 1: the body is 34 mm below the floor during its flight.")
 
-    monkeypatch.setattr("dropspin.comparisons.logs.replay.measured_scene", below)
+    monkeypatch.setattr("dropspin.comparisons.logs.continued_tosses.measured_scene", below)
     with (recording / "toss.toml").open("a") as file:
         file.write("[floor]\nrestitution = 0.5\nfriction = 0.5\n")
     done = dropspin("log", "check", "toss.toml", "-o", "out", cwd=recording)

@@ -8,8 +8,7 @@ from support.taylor import Solution
 from dropspin.scenarios.mechanics import angular_momentum_of, kinetic_energy_of
 from dropspin.scenarios.rotations import angle_between_orientations, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-from dropspin.scenarios.truths.free_rotor import free_rotor
-from dropspin.scenarios.truths.settings import (
+from dropspin.scenarios.truths.damped_joint import (
     bullet_damping,
     fall,
     free_motion,
@@ -18,6 +17,7 @@ from dropspin.scenarios.truths.settings import (
     terminal_speed,
     time_constant,
 )
+from dropspin.scenarios.truths.free_rotor import free_rotor
 
 MOMENTS = np.array([0.01, 0.02, 0.025])
 SPIN_3D = np.array([3.0, 4.0, 5.0])

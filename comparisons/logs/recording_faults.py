@@ -14,7 +14,7 @@ from dropspin.comparisons.logs.log import Cause, Finding, Log, Toss
 from dropspin.comparisons.logs.noise import Noise
 from dropspin.comparisons.logs.rest import level_share, rests
 from dropspin.comparisons.logs.rotors import rotation
-from dropspin.comparisons.running.belonging import missing_frames
+from dropspin.comparisons.running.foreign_motions import missing_frames
 from dropspin.scenarios.bodies import Body, Box, Ellipsoid
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.rotations import conjugate, cross, length, multiply, rotate, unrotate

@@ -14,7 +14,7 @@ from dropspin.reports.plots.ensembles import angular_momentum_of_ensemble, energ
 from dropspin.reports.plots.growth import error_growth
 from dropspin.reports.plots.limits import failure_modes
 from dropspin.reports.plots.over_time import over_time, quantities
-from dropspin.reports.plots.spins import polhode
+from dropspin.reports.plots.polhodes import polhode
 from dropspin.reports.plots.tradeoff import error_over_cost, throughput
 from dropspin.scenarios import reference_for
 

@@ -6,6 +6,10 @@ from dropspin.scenarios import DropspinError
 
 GIB = 2**30  # bytes
 MOST_SECONDS, MOST_BYTES = 1e7, 2**60
+WALL_TIME_FACTOR = 10.0
+"""Wall time allowed over processor time allowed: an engine that sleeps forever uses no processor time."""
+COMPILATION = 600.0
+"""Processor time allowed for compiling, beyond that for the work [s], of an engine that compiles."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.results.interrupts import finished, interrupts_deferred
 from dropspin.comparisons.running.engine_process import PROCESSES, call, memory_for_data, start_process
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
-from dropspin.comparisons.running.process_limits import GIB, ResourceLimits
+from dropspin.comparisons.running.process_limits import COMPILATION, GIB, WALL_TIME_FACTOR, ResourceLimits
 from dropspin.comparisons.running.progress import OnSimulations
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
@@ -36,10 +36,6 @@ Result = TypeVar("Result")
 POLL, GRACE = 0.5, 2.0  # s, between checks of a process, and for the pool to report its end
 NEAR_LIMIT = 0.5
 """Share of the memory limit above which a crash mentions it."""
-WALL_TIME_FACTOR = 10.0
-"""Wall time allowed over processor time allowed: an engine that sleeps forever uses no processor time."""
-COMPILATION = 600.0
-"""Processor time allowed for compiling, beyond that for the work [s], of an engine that compiles."""
 
 
 class Closed(Exception):

@@ -27,10 +27,10 @@ from dropspin.scenarios import Scenario, SceneError, Trajectory
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.damping import MOTIONS
 from dropspin.scenarios.ensemble import clearances, spread_starts
+from dropspin.scenarios.fields import Path, path_of, set_field, with_fields
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, UP, Array
 from dropspin.scenarios.tables import unit
-from dropspin.scenarios.variations import Path, path_of, set_field, with_fields
 
 FRICTION = "floor.friction"
 ARRAY_FIELDS = {("floor", "restitution"), ("floor", "friction"), ("floor", "rest_speed"), ("damping", "linear"), ("damping", "angular")}

@@ -16,8 +16,8 @@ from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.sweeps.axes import Drawn, Indices, SweepAxis
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.ensemble import spread_start
+from dropspin.scenarios.fields import content_of, path_of, set_field, with_fields
 from dropspin.scenarios.validation import shown
-from dropspin.scenarios.variations import content_of, path_of, set_field, with_fields
 
 OPTION = "engine."
 KEY_DIGITS = 20

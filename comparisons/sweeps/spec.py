@@ -16,10 +16,10 @@ from dropspin.comparisons.sweeps.jobs import OPTION, Sweep, configured
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS
 from dropspin.scenarios import DropspinError, Scenario, SceneError, load
 from dropspin.scenarios.errors import verify_known
+from dropspin.scenarios.fields import NoSuchField, verify_field, with_fields
 from dropspin.scenarios.loading import TOO_LARGE, read_toml
 from dropspin.scenarios.tables import Number, Positive, Table
 from dropspin.scenarios.validation import shown, validated
-from dropspin.scenarios.variations import NoSuchField, verify_field, with_fields
 
 MOST_JOBS = 10**15
 WHOLE_NUMBERS = frozenset({"ensemble.size", "ensemble.seed"})

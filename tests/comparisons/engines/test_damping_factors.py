@@ -12,7 +12,8 @@ from dropspin.comparisons.measuring.motions import Setup
 from dropspin.comparisons.sweeps.spec import load_sweep
 from dropspin.comparisons.sweeps.work import run_jobs
 from dropspin.scenarios import Trajectory, truth_for
-from dropspin.scenarios.variations import in_units, with_fields
+from dropspin.scenarios.fields import with_fields
+from dropspin.scenarios.variations import in_units
 
 V, W, C, K, DT = 5.0, 3.0, 0.999, 0.98, 0.015  # m/s, rad/s, factors of a step of DT
 EPS = np.finfo(float).eps  # the factor and its product are rounded by half of it in each step; measured 0.4 of that, in PyBullet

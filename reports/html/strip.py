@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dropspin.reports.replay.motions import Motion, Replay
-from dropspin.scenarios.bodies.hull import Outline, convex_hull
+from dropspin.scenarios.bodies.hull import convex_hull
+from dropspin.scenarios.bodies.outline import Outline
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import Array
 

@@ -13,7 +13,7 @@ from dropspin.comparisons.results.folder import written_whole
 from dropspin.reports.plots.colours import human_label
 from dropspin.reports.replay.motions import Motion, Replay
 from dropspin.scenarios import DropspinError
-from dropspin.scenarios.bodies.hull import Outline
+from dropspin.scenarios.bodies.outline import Outline
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.surfaces import Wall

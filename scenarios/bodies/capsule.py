@@ -5,8 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from dropspin.scenarios.bodies.hull import Outline, around_axis, outline
 from dropspin.scenarios.bodies.on_axis import OnAxis
+from dropspin.scenarios.bodies.outline import Outline, around_axis, outline
 from dropspin.scenarios.state import Array
 
 

@@ -6,9 +6,10 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
-from dropspin.scenarios.bodies.hull import FLAT, Outline, hull_corners, lowest_face, outline
+from dropspin.scenarios.bodies.hull import FLAT, hull_corners, lowest_face
 from dropspin.scenarios.bodies.inertia import Moments, second_moments
 from dropspin.scenarios.bodies.mesh_files import Faces
+from dropspin.scenarios.bodies.outline import Outline, outline
 from dropspin.scenarios.bodies.shape import Shape
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.tables import AS_LISTS, Vector, rows

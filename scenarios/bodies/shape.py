@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from pydantic import model_validator
 
-from dropspin.scenarios.bodies.hull import Outline, around_axis, outline
 from dropspin.scenarios.bodies.inertia import Moments, is_diagonal, mean_squares, tensor
+from dropspin.scenarios.bodies.outline import Outline, around_axis, outline
 from dropspin.scenarios.bodies.possible_moments import largest_multiple
 from dropspin.scenarios.bodies.surface import RIM, rise_of_centre
 from dropspin.scenarios.rotations import rotate

@@ -5,8 +5,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from dropspin.scenarios.bodies.hull import Outline
 from dropspin.scenarios.bodies.inertia import Moments
+from dropspin.scenarios.bodies.outline import Outline
 from dropspin.scenarios.bodies.shape import Shape
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.tables import Positive

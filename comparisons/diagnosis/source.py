@@ -140,7 +140,10 @@ def _read(path: Path, home: Path, within: tuple[Path, ...], count: list[int]) ->
 
 
 def mjcf_setting(element: Element, attribute: str) -> Setting | None:
-    """Where an attribute of an element of MJCF was set: there, or in a default class that applies to it; None if nowhere."""
+    """Where an attribute of an element of MJCF was set: there, or in a default class that applies to it; None if nowhere.
+
+    MuJoCo merges several sections of defaults into one.
+    """
     if attribute in element.attributes or element.tag in NO_DEFAULTS:
         return element.setting(attribute)
     name, place = element.attributes.get("class"), element.parent
@@ -150,14 +153,15 @@ def mjcf_setting(element: Element, attribute: str) -> Setting | None:
     while root.parent is not None:
         root = root.parent
     classes = list(root.every("default"))
+    sections = [one for one in classes if one.parent is root]
     chosen = [one for one in classes if one.attributes.get("class") == name] if name else []
-    chosen = chosen or [one for one in classes if one.parent is root]
-    default: Element | None = chosen[-1] if chosen else None
+    default: Element | None = next(reversed(chosen or sections), None)
     while default is not None and default.tag == "default":
         for child in reversed(default.children):
             if child.tag == element.tag and attribute in child.attributes:
                 return child.setting(attribute)
-        default = default.parent
+        earlier = sections[: next((number for number, section in enumerate(sections) if section is default), 0)]
+        default = earlier[-1] if earlier else default.parent
     return None
 
 

@@ -71,6 +71,13 @@ def test_geometry_and_joint_within_frames_have_their_lines(tmp_path):
     assert (settings["damping"].line, settings["margin"].line) == (2, 3)
 
 
+def test_settings_of_all_sections_of_defaults_are_found(tmp_path):
+    """As an included file may bring one more; of several, MuJoCo takes the last value."""
+    one, other = '<default><geom margin=".002" solimp=".8 .9 .001"/></default>', '<default><geom margin=".001"/><site size=".1"/></default>'
+    settings = body_of(tmp_path, FREE.format(LID), head=one + other).facts.settings
+    assert {name: settings[name].text for name in ("margin", "solimp")} == {"margin": 'margin=".001"', "solimp": 'solimp=".8 .9 .001"'}
+
+
 def test_gravcomp_of_a_welded_part_lifts_its_own_weight(tmp_path):
     part = '<body name="w" gravcomp="1"><geom type="box" size=".1 .1 .02" mass="1" pos="0 0 .06"/></body>'
     body = body_of(tmp_path, FREE.format(f'<geom type="box" size=".1 .1 .04" mass="1"/>{part}'))

@@ -5,6 +5,7 @@ that is imported. pip chooses wheels only, and npm runs no scripts, so that no c
 """
 
 import json
+import os
 import re
 import sys
 import sysconfig
@@ -148,12 +149,14 @@ def python_of(folder: Path) -> str:
 
 
 def run(command: Sequence[str], stopping: Event) -> tuple[int, str]:
-    """The exit code and the output of a command.
+    """The exit code and the output of a command, without colours and in UTF-8, because it is parsed.
 
     Raises:
         Closed: `stopping` was set; the command is ended.
     """
-    with Popen(command, stdout=PIPE, stderr=STDOUT, text=True, errors="replace") as process:
+    plain = {name: value for name, value in os.environ.items() if name != "FORCE_COLOR"}
+    plain |= {"NO_COLOR": "1", "TTY_COMPATIBLE": "0", "PYTHONIOENCODING": "utf-8"}
+    with Popen(command, stdout=PIPE, stderr=STDOUT, encoding="utf-8", errors="replace", env=plain) as process:
         try:
             while not stopping.is_set():
                 with suppress(TimeoutExpired):

@@ -1,8 +1,10 @@
 """The public reports: their list, the verdict from rows, and one case as a process."""
 
 import json
+import sys
 from itertools import pairwise
 from pathlib import Path
+from threading import Event
 from types import SimpleNamespace
 
 import pandas as pd
@@ -12,6 +14,7 @@ from support.cli import dropspin
 from dropspin.comparisons.engines.packages import numbers_of, version
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.record.bugs import FILE, Bug, Outcome, Verdict, load_bugs, measure, prepare, state_of, verdict
+from dropspin.comparisons.record.environments import run
 from dropspin.comparisons.record.plan import load_plan
 from dropspin.scenarios import UnknownName, load
 
@@ -126,6 +129,14 @@ def test_a_breakdown_in_either_scene_is_no_other_value(broken, other, tmp_path, 
     monkeypatch.setattr("dropspin.comparisons.record.bugs.load_results", lambda *where, arrays: SimpleNamespace(table=pd.DataFrame(rows)))
     for outcome in measure([bug], tmp_path, jobs=1, on_done=lambda *one: None)[bug.name]:
         assert (outcome.state, outcome.said) == ("not run", "crashed: no such option")
+
+
+def test_output_that_is_parsed_has_no_colours_and_all_characters(monkeypatch):
+    """Workflows of GitHub often force colours; the failures of a run begin with a mark that ASCII lacks."""
+    for name, value in {"FORCE_COLOR": "1", "PYTHONIOENCODING": "ascii:replace", "TTY_COMPATIBLE": "1"}.items():
+        monkeypatch.setenv(name, value)
+    program = "from rich.console import Console; Console().print('✗ failed', style='bold red')"
+    assert run([sys.executable, "-c", program], Event()) == (0, "✗ failed\n")
 
 
 @pytest.mark.extended

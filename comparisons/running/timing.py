@@ -68,6 +68,7 @@ def time_steps(engine: Engine, given: Scenario | Sequence[Scenario], dt: float, 
             simulation.advance(number)
             last = simulation.state() if isinstance(given, Scenario) else numpy_array(simulation.states())
             times.append(time.perf_counter())
+        last = np.array(last)  # it may be the engine's own memory, which ends with the simulation
     building, call, stepping = (later - earlier for earlier, later in pairwise(times))
     return TimedSteps(building, call, stepping, steps, last)
 

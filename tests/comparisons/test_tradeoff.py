@@ -205,7 +205,18 @@ class Idle(Together):
         pass
 
 
-@pytest.mark.parametrize(("batch", "has_cost"), [(Together, True), (Idle, False)])
+class Reusing(Together):
+    """Gives its own memory, which the next simulation uses."""
+
+    def states(self):
+        self._memory = super().states()
+        return self._memory
+
+    def close(self):
+        self._memory[:] = np.nan
+
+
+@pytest.mark.parametrize(("batch", "has_cost"), [(Together, True), (Reusing, True), (Idle, False)])
 def test_batch_whose_states_are_not_those_of_a_single_simulation_has_no_cost(batch, has_cost):
     def prepare_batch(self, members, dt):
         return batch([self.prepare(member, dt) for member in members])

@@ -17,6 +17,7 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.recording import Breakdown, classify
 from dropspin.comparisons.running.timing import (
     TIMING_REPEATS,
     TimedSteps,
@@ -67,37 +68,38 @@ def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
     return math.nan
 
 
-def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], worlds: int) -> list[float]:
-    """Wall time per simulated second and world [s/s] of a batch at each time step, as by `cost`.
+def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], worlds: int) -> tuple[list[float], Breakdown | None]:
+    """Wall time per simulated second and world [s/s] of a batch at each time step, as by `cost`, and why the first without one has none.
 
-    NaN if its states are not finite, or after the first steps not those of a single simulation. With a floor, runs that are too long,
-    judged by their first steps, are not timed.
-
-    Raises:
-        Breakdown: The engine cannot simulate batches.
+    NaN if its states are not finite, or after the first steps not those of a single simulation. Whole runs that are too long, judged by
+    their first steps, are not timed; this counts as no failure.
     """
-    times = []
+    times: list[float] = []
+    failure: Breakdown | None = None
     for dt in dts:
         timed, steps = partial(_finite, entry.adapter, [scene] * worlds, dt), scene.steps(dt)
         times.append(math.nan)
-        with suppress(Diverged):
+        try:
             _verify_alike(entry, scene, timed(1).state, time_steps(entry.adapter, scene, dt, 1).state)  # and compile
             if scene.floor is None:
-                times[-1] = time_per_step(timings_in_flight(timed, FIRST_STEPS_OF_A_BATCH, 1, BATCH_SECONDS))
-            elif timed(FIRST_STEPS).stepping * steps <= LONGEST_BATCH * FIRST_STEPS:
+                with suppress(Diverged):
+                    times[-1] = time_per_step(timings_in_flight(timed, FIRST_STEPS_OF_A_BATCH, 1, BATCH_SECONDS))
+            if math.isnan(times[-1]) and timed(FIRST_STEPS).stepping * steps <= LONGEST_BATCH * FIRST_STEPS:
                 times[-1] = time_per_step([timed(steps)])
-    return [per_step / (dt * worlds) for dt, per_step in zip(dts, times, strict=True)]
+        except Exception as error:  # whatever an engine raises costs its own batch only
+            failure = failure or classify(error)
+    return [per_step / (dt * worlds) for dt, per_step in zip(dts, times, strict=True)], failure
 
 
 def _verify_alike(entry: EngineEntry, scene: Scenario, batch: Array, alone: Array) -> None:
     """Compare the states of a batch, (size, 13), with that of a single simulation, (13,), over how far that has moved.
 
     Raises:
-        Diverged: They differ.
+        Breakdown: They differ.
     """
     rounding = ROUNDING * np.finfo(entry.adapter.precision).eps * np.abs(alone).max()
     if not np.abs(batch - alone).max() <= ALIKE * np.abs(alone - scene.initial_state).max() + rounding:
-        raise Diverged("the states of the batch are not those of a single simulation")
+        raise Breakdown("failed", "the states of a batch are not those of a single simulation")
 
 
 def _finite(*args: Any) -> TimedSteps:

@@ -7,7 +7,6 @@ import math
 import os
 import time
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise, takewhile
 from typing import Literal
@@ -15,12 +14,13 @@ from typing import Literal
 import numpy as np
 
 from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.engines.exceptions import short
 from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown, record, verify_accepted
+from dropspin.comparisons.running.recording import Breakdown, divergence, record, verify_accepted
 from dropspin.comparisons.running.start_phases import StartPhase, start_phases
 from dropspin.scenarios import Scenario, truth_for
 
@@ -58,6 +58,8 @@ class Ladder:
         reason: The reason why no smaller time step was tried, as a clause.
         left_out: The reason why the engine is left out of the comparison; empty if it is compared.
         verdict: The verdict on the engine if it broke down, declines the scene or is not installed; otherwise None.
+        undefined: Why there is no error at the smallest time step without one, such as that the state is not finite.
+        no_batch_cost: Why batches have no cost at the largest time step without one; empty for an engine without batches.
     """
 
     engine: str
@@ -66,6 +68,8 @@ class Ladder:
     reason: str
     left_out: str = ""
     verdict: Verdict | None = None
+    undefined: str = ""
+    no_batch_cost: str = ""
 
     @property
     def completed(self) -> tuple[tuple[float, float], ...]:
@@ -104,6 +108,7 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
     spent = 0.0
     verdict: Verdict | None = None
     ended: Ending = "longest_run"
+    undefined = ""
     reason = f"a run at the next smaller time step would have more than {most:,} steps"
     run = processes.call(entry, _errors, scene, interval, 1, metrics)  # compiles and warms up before anything is timed
     if isinstance(run, Breakdown):
@@ -116,6 +121,7 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
             break
         tried.append((interval / division, run[0]))
         spent += run[1]
+        undefined = run[2] or undefined
         if stalled := _stalled([errors[0] for _, errors in tried if np.isfinite(errors[0])]):
             ended, reason = "error_stopped_falling", f"at the last {stalled} time steps the error fell by less than a fifth each"
             break
@@ -123,7 +129,8 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
             ended, reason = "budget", f"the budget of {budget:g} s of processor time was spent"
             break
     steps = tuple((dt, errors[0]) for dt, errors in tried)
-    return Ladder(entry.label, steps, ended, reason, _left_out(scene, tried, metrics[1], reason), verdict)
+    left_out = _left_out(scene, tried, metrics[1], undefined or reason)
+    return Ladder(entry.label, steps, ended, reason, left_out, verdict, undefined)
 
 
 def _stalled(errors: Sequence[float]) -> int:
@@ -155,18 +162,23 @@ def _covered(scene: Scenario) -> float:
     return max(scene.body.size, float(np.linalg.norm(position - position[0], axis=1).max()))
 
 
-def _errors(entry: EngineEntry, scene: Scenario, dt: float, division: int, metrics: Sequence[str]) -> tuple[list[float], float]:
-    """Absolute values of metrics at a time step, NaN if one is undefined, and the processor time of their measurement [s]."""
+def _errors(entry: EngineEntry, scene: Scenario, dt: float, division: int, metrics: Sequence[str]) -> tuple[list[float], float, str]:
+    """Absolute values of metrics at a time step, and the processor time of their measurement [s]; if one is undefined, NaN and why."""
     start = processor_time()
     verify_accepted(entry.adapter, scene)
     truth, every = truth_for(scene), division if scene.floor is None else 1
     phases = [StartPhase(scene, truth)] if scene.floor is None else start_phases(scene, truth, dt)
-    errors = [math.nan] * len(metrics)
-    with suppress(Diverged, Unresolved):
-        motions = ((phase, record(entry.adapter, phase.scene, dt, every).motion) for phase in phases)
-        cases = [Comparison.with_truth(phase.scene, motion, phase.truth) for phase, motion in motions]
+    motions, why = [], "the metric has no value"
+    try:
+        motions = [record(entry.adapter, phase.scene, dt, every).motion for phase in phases]
+        cases = [Comparison.with_truth(phase.scene, motion, phase.truth) for phase, motion in zip(phases, motions, strict=True)]
         errors = [abs(METRICS[metric].value(cases)) for metric in metrics]
-    return errors if np.isfinite(errors).all() else [math.nan] * len(metrics), processor_time() - start
+        if np.isfinite(errors).all():
+            return errors, processor_time() - start, ""
+    except (Diverged, Unresolved) as error:
+        why = short(str(error))
+    why = next((broken.reason for broken in map(divergence, motions) if broken), why)
+    return [math.nan] * len(metrics), processor_time() - start, why
 
 
 def processor_time() -> float:

@@ -123,16 +123,24 @@ def tradeoff(
         crews = [processes] * min(as_jobs(jobs), len(entries))
         ladders = results_in_parallel(list(entries.values()), errors, crews, lambda work, share: report(work, 0.5 * share))
         compared = [(entries[ladder.engine], ladder) for ladder in ladders if not ladder.left_out]
-        points, others = _with_costs(compared, scene, sizes, processes, report)
+        points, others, failures = _with_costs(compared, scene, sizes, processes, report)
         memory = _memory(entries, points, scene, sizes[-1], processes)
     measured = {point.engine for point in points}
     without = {ladder.engine for ladder in ladders if not ladder.left_out} - measured
     ladders = [replace(ladder, left_out=NO_COST, verdict="crashed") if ladder.engine in without else ladder for ladder in ladders]
+    ladders = [_with_failure(ladder, failures.get(ladder.engine)) for ladder in ladders]
     result = TradeOff(scene, chosen, points, tuple(ladders), sizes, memory, others)
     if not points:
         reasons = "; ".join(f"{label}: {why.removesuffix('.')}" for label, why in result.left_out.items())
         raise NotCompared(f"no engine can be compared in {scene.name}: {reasons}.", ladders)
     return result
+
+
+def _with_failure(ladder: Ladder, of_batches: Breakdown | None) -> Ladder:
+    """A ladder with the reason why batches have no cost, unless the engine has no batches; a breakdown is one of the engine."""
+    if of_batches is None or of_batches.verdict == "declined":
+        return ladder
+    return replace(ladder, no_batch_cost=of_batches.reason, verdict=ladder.verdict or of_batches.verdict)
 
 
 def _with_costs(
@@ -141,10 +149,10 @@ def _with_costs(
     worlds: Sequence[int],
     processes: EngineProcesses,
     on_progress: OnProgress,
-) -> tuple[tuple[CostPoint, ...], float]:
+) -> tuple[tuple[CostPoint, ...], float, dict[str, Breakdown]]:
     """The configurations of the ladders that have a finite error and a finite cost, with the cost in every round and in batches.
 
-    And the mean `load` of the machine.
+    And the mean `load` of the machine, and the first failure of the batches of each engine.
     """
     steps = [(entry, dt, error) for entry, ladder in ladders for dt, error in ladder.steps if np.isfinite(error)]
     costs, loads = np.full((len(steps), ROUNDS), np.nan), []
@@ -154,13 +162,17 @@ def _with_costs(
             if number == 0 or np.isfinite(costs[row, number - 1]):
                 costs[row, number] = _or_nan(processes.call(entry, cost, scene, dt))
         on_progress(f"round {number + 1} of {ROUNDS}", 0.5 + 0.4 * (number + 1) / ROUNDS)
+    failures: dict[str, Breakdown] = {}
     batches = np.full((len(steps), len(worlds), BATCH_ROUNDS), np.nan)
     for number in range(BATCH_ROUNDS):
         for entry, ladder in ladders:
             rows = [row for row, (owner, _, _) in enumerate(steps) if owner is entry]
             dts = [steps[row][1] for row in rows]
             for column, size in enumerate(worlds):
-                batches[rows, column, number] = _or_nan(processes.call(entry, costs_per_world, scene, dts, size))
+                found = processes.call(entry, costs_per_world, scene, dts, size)
+                batches[rows, column, number], failure = (math.nan, found) if isinstance(found, Breakdown) else found
+                if failure is not None:
+                    failures.setdefault(entry.label, failure)
             on_progress(f"batches of {ladder.engine}", 0.9 + 0.1 * (number + 1) / BATCH_ROUNDS)
     points = []
     for (entry, dt, error), rounds, by_size in zip(steps, costs, batches, strict=True):
@@ -168,7 +180,7 @@ def _with_costs(
             timed = {size: values for size, values in zip(worlds, by_size, strict=True) if np.isfinite(values).all()}
             least = {size: float(values.min()) for size, values in timed.items()}
             points.append(CostPoint(entry.label, dt, error, rounds, least, {size: spread(values) for size, values in timed.items()}))
-    return tuple(points), float(np.mean(loads)) if loads else math.nan
+    return tuple(points), float(np.mean(loads)) if loads else math.nan, failures
 
 
 def _memory(

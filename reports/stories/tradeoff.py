@@ -74,6 +74,8 @@ def rows(study: TradeOff) -> Records:
             "ladder_ended": ladder.ended,
             "ladder_reason": ladder.reason,
             "left_out": ladder.left_out or None,
+            "no_error_reason": ladder.undefined or None,
+            "no_batch_cost_reason": ladder.no_batch_cost or None,
         }
         for ladder in study.ladders
         for dt, error in ladder.steps or [(math.nan, math.nan)]
@@ -124,19 +126,19 @@ def sentences(study: TradeOff, within: Sequence[float]) -> list[str]:
         *_undefined(study),
         *(f"No smaller time steps than these were tried, because {reason}: {engines}." for reason, engines in ends.items()),
         *left_out(study.left_out),
+        *(f"Batches without a cost: {one.engine}, {one.no_batch_cost.removesuffix('.')}." for one in study.ladders if one.no_batch_cost),
     ]
 
 
 def _undefined(study: TradeOff) -> list[str]:
-    """A sentence for each engine that diverges, or has no error, at time steps below one at which it has an error."""
-    found = []
+    """Sentences on the engines that are compared and diverge, or have no error, at some of their time steps."""
+    causes: dict[str, list[str]] = {}
     for ladder in study.ladders:
-        finite = [dt for dt, error in ladder.completed if math.isfinite(error)]
-        without = [dt for dt, error in ladder.completed if not math.isfinite(error) and finite and dt < max(finite)]
+        without = [dt for dt, error in ladder.completed if not math.isfinite(error)]
         if without and not ladder.left_out:
-            steps = counted(len(without), "smaller time step", "smaller time steps")
-            found.append(f"{ladder.engine} has an error at {in_ms(max(finite))}, and none at {steps} down to {in_ms(min(without))}.")
-    return found
+            steps = f"{len(without)} of {counted(len(ladder.completed), 'time step', 'time steps')}, down to {in_ms(without[-1])}"
+            causes.setdefault(f"No error at {steps}, because {ladder.undefined}", []).append(ladder.engine)
+    return [f"{cause}: {', '.join(engines)}." for cause, engines in causes.items()]
 
 
 def _recommendation(study: TradeOff, tolerance: float) -> str:

@@ -13,6 +13,8 @@ from dropspin.comparisons.engines.base import BatchSimulation, Diverged
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.running import timing
 from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.process_limits import FIVE_MINUTES
+from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown, simulate
 from dropspin.comparisons.running.run import measure
 from dropspin.comparisons.tradeoff import costs, errors, study
@@ -165,7 +167,7 @@ def test_cost_of_a_step_in_flight_is_without_that_of_the_call(monkeypatch, dt):
     monkeypatch.setattr(timing.time, "perf_counter", lambda: CostlyCalls.clock)
     entry = EngineEntry("costly-calls", CostlyCalls())
     assert costs.cost(entry, SPIN, dt) == pytest.approx(STEP / dt, rel=1e-9)
-    assert costs.costs_per_world(entry, SPIN, [dt, 2 * dt], 4) == pytest.approx([STEP / dt, STEP / (2 * dt)], rel=1e-9)
+    assert costs.costs_per_world(entry, SPIN, [dt, 2 * dt], 4) == (pytest.approx([STEP / dt, STEP / (2 * dt)], rel=1e-9), None)
 
 
 class SlowStart(CostlyCalls):
@@ -195,7 +197,7 @@ def test_cost_per_world_of_an_engine_that_divides_its_steps(monkeypatch):
     """It is the same at all steps, and timed at each: it is not derived from that at the smallest."""
     monkeypatch.setattr(timing.time, "perf_counter", lambda: CostlyCalls.clock)
     entry = EngineEntry("substeps", Substeps())
-    assert costs.costs_per_world(entry, SPIN, [1e-2, 1e-3], 4) == pytest.approx([STEP / 1e-3] * 2, rel=1e-9)
+    assert costs.costs_per_world(entry, SPIN, [1e-2, 1e-3], 4) == (pytest.approx([STEP / 1e-3] * 2, rel=1e-9), None)
 
 
 class Idle(Together):
@@ -216,13 +218,47 @@ class Reusing(Together):
         self._memory[:] = np.nan
 
 
-@pytest.mark.parametrize(("batch", "has_cost"), [(Together, True), (Reusing, True), (Idle, False)])
-def test_batch_whose_states_are_not_those_of_a_single_simulation_has_no_cost(batch, has_cost):
+class Failing(Together):
+    """Fails at 20 ms."""
+
+    def advance(self, steps):
+        super().advance(steps)
+        if self._simulations[0]._dt == 0.02:
+            raise RuntimeError("no memory")
+
+
+class NotFinite(Together):
+    """Its last world is not finite after some steps."""
+
+    def states(self):
+        states = super().states()
+        states[-1] *= np.nan if self._simulations[0]._step > 300 else 1.0
+        return states
+
+
+@pytest.mark.parametrize(
+    ("batch", "are_timed", "verdict", "reason"),
+    [
+        (Together, [True, True], None, ""),
+        (Reusing, [True, True], None, ""),
+        (Failing, [True, False], "crashed", "RuntimeError: no memory"),
+        (NotFinite, [False, False], "diverged", "the state is not finite"),
+        (Idle, [False, False], "failed", "the states of a batch are not those of a single simulation"),
+    ],
+)
+def test_batch_without_a_cost_has_the_reason(batch, are_timed, verdict, reason):
+    """Which is that of its ladder, with the verdict; an engine without batches has none."""
+
     def prepare_batch(self, members, dt):
         return batch([self.prepare(member, dt) for member in members])
 
     engine = type("Batched", (Exact,), {"name": "batched", "prepare_batch": prepare_batch})()
-    assert np.isfinite(costs.costs_per_world(EngineEntry("batched", engine), SPIN, [1e-2], 4)).all() == has_cost
+    times, failure = costs.costs_per_world(EngineEntry("batched", engine), SPIN, [1e-2, 2e-2], 4)
+    assert np.isfinite(times).tolist() == are_timed
+    ladder = study._with_failure(Ladder("batched", (), "budget", ""), failure)
+    assert (ladder.verdict, ladder.no_batch_cost) == (verdict, reason)
+    _, without = costs.costs_per_world(EngineEntry("exact", Exact()), SPIN, [1e-2], 4)
+    assert study._with_failure(ladder, without) == ladder
 
 
 @pytest.fixture(scope="module")
@@ -346,12 +382,31 @@ class Never(Exact):
         raise Diverged("no step is small enough")
 
 
+SHORT = SPIN.model_copy(update={"duration": 4.0})
+
+
+class NoNumbers(Exact):
+    """Has no numbers at steps below 50 ms, where it is right above."""
+
+    name = "no-numbers"
+
+    def prepare(self, scene, dt):
+        return ExactSimulation(scene, dt, (lambda row, time: row * np.nan) if dt < 0.05 else None)
+
+
+@pytest.mark.parametrize(("engine", "why"), [(Never(), "no step is small enough"), (NoNumbers(), "the state is not finite at t = ")])
+def test_time_steps_without_an_error_have_the_reason(engine, why, monkeypatch):
+    monkeypatch.setattr(errors, "MOST_STEPS", 100)
+    with EngineProcesses(FIVE_MINUTES) as processes:
+        ladder = errors.errors_over_steps(EngineEntry(engine.name, engine), SHORT, ["orientation_error"] * 2, 1.0, processes)
+    assert ladder.undefined.startswith(why)
+    assert ladder.verdict is None
+    assert (f": {why}" in ladder.left_out) == isinstance(engine, Never)
+
+
 @pytest.fixture
 def _processor_time_of_the_steps(monkeypatch):
     monkeypatch.setattr(errors, "processor_time", lambda: Clock.now)
-
-
-SHORT = SPIN.model_copy(update={"duration": 4.0})
 
 
 @pytest.mark.usefixtures("_processor_time_of_the_steps")

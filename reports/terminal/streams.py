@@ -1,8 +1,20 @@
 """Standard output and standard error that raise no error: a closed pipe or a full device costs what is printed there, and nothing else."""
 
+import codecs
 import io
 import os
 from typing import IO
+
+STAND_INS = {"✓": "+", "✗": "X", "†": "#", "⏱": "T", "∞": "D", "·": ".", "–": "-", "µ": "u"}
+"""Characters in the place of marks of outcomes, and of micro, that an encoding lacks: as different from each other, and as wide."""
+
+
+def _stand_in(error: UnicodeError) -> tuple[str, int]:
+    assert isinstance(error, UnicodeEncodeError)
+    return "".join(STAND_INS.get(character, "?") for character in error.object[error.start : error.end]), error.end
+
+
+codecs.register_error("stand-in", _stand_in)
 
 
 class _Unfailing(io.TextIOWrapper):
@@ -32,17 +44,18 @@ class _Unfailing(io.TextIOWrapper):
 def unfailing(stream: IO[str]) -> IO[str]:
     """The stream of an open file without its errors, of which `error_of` has the first one.
 
-    A character that it cannot encode becomes a question mark. Any other stream, such as one in memory, is returned unchanged.
+    A character that it cannot encode becomes its stand-in, or else a question mark. Any other stream, such as one in memory, is returned
+    unchanged.
     """
     if not isinstance(stream, io.TextIOWrapper):
         return stream
     try:
         os.set_blocking(stream.fileno(), True)  # another process may have set it not to wait for a slow reader
     except OSError:  # of a stream in memory
-        stream.reconfigure(errors="replace")
+        stream.reconfigure(errors="stand-in")
         return stream
     file = open(stream.fileno(), "wb", closefd=False)  # noqa: SIM115 - until the end of the process
-    return _Unfailing(file, stream.encoding, "replace", line_buffering=stream.line_buffering)
+    return _Unfailing(file, stream.encoding, "stand-in", line_buffering=stream.line_buffering)
 
 
 def error_of(stream: IO[str]) -> OSError | None:

@@ -14,11 +14,13 @@ import yaml
 from support.cli import Started, dropspin, spawn
 
 import dropspin as ds
+from dropspin.comparisons.judging.verdicts import MARKS
 from dropspin.comparisons.robustness import study
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ONE_MINUTE
 from dropspin.reports.commands import main as cli
 from dropspin.reports.commands.limits import limits_command
 from dropspin.reports.commands.run import run_command
+from dropspin.reports.terminal.streams import unfailing
 
 ROOT = Path(__file__).parents[3]
 HARSH = """
@@ -176,6 +178,18 @@ def test_terminals_without_utf_8(encoding, tmp_path, monkeypatch):
         printed += sys.stdout.buffer.getvalue()
         assert end.value.code == 0
     assert b"?" in printed
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])
+def test_marks_of_outcomes_stay_different_without_utf_8(encoding):
+    """And as wide; any other character becomes a question mark, as the mark of a missing engine is."""
+    marks = "".join(dict.fromkeys([*MARKS.values(), "~", "–"]))
+    stream = unfailing(io.TextIOWrapper(io.BytesIO(), encoding=encoding))
+    stream.write(marks.replace("?", "ω"))
+    stream.flush()
+    printed = stream.buffer.getvalue().decode(encoding)
+    assert len(set(printed)) == len(printed) == len(marks)
+    assert printed[marks.index("?")] == "?"
 
 
 @pytest.mark.extended

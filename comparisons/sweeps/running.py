@@ -60,7 +60,9 @@ def run_sweep(
         if earlier.identity != work.identity:
             then, now = earlier.versions, work.versions
             changed = [f"{name} {then.get(name)}, now {now[name]}" for name in now if then.get(name) != now[name]]
-            difference = f"a sweep that was run with {', '.join(changed)}" if changed else "another sweep: the specs differ"
+            difference = (
+                f"a sweep that was run with {', '.join(changed)}" if changed else "another sweep: the specs or the time limits differ"
+            )
             raise DropspinError(f"{where}: holds {difference}; {another}.")
         if not resume:
             raise DropspinError(f"{where}: holds {kept:,} of {sweep.size:,} jobs of this sweep; resume it with --resume, or {another}.")

@@ -60,7 +60,7 @@ class Work:
 
     @property
     def asked(self) -> dict[str, Any]:
-        """The sweep as a mapping for JSON."""
+        """The sweep and the time limit, which decides which jobs time out, as a mapping for JSON."""
         sweep = self.sweep
         return {
             "scenes": {
@@ -72,6 +72,7 @@ class Work:
             "axes": [{"kind": type(axis).__name__.lower(), **vars(axis)} for axis in sweep.axes],
             "draws": sweep.draws,
             "metrics": list(sweep.metrics),
+            "time_limit": self.resources.processor_time,
         }
 
     @property

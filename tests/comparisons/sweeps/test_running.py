@@ -154,8 +154,9 @@ def test_folder_that_holds_something_else_is_refused(tmp_path):
     run_sweep(load_sweep(SPEC), where)
     with pytest.raises(DropspinError, match="holds 8 of 8 jobs of this sweep; resume it with --resume, or choose another folder with -o"):
         run_sweep(load_sweep(SPEC), where)
-    with pytest.raises(DropspinError, match="holds another sweep: the specs differ; choose another folder with -o"):
-        run_sweep(load_sweep(SPEC | {"dts": [2e-3]}), where, resume=True)
+    for spec, seconds in ((SPEC | {"dts": [2e-3]}, 60.0), (SPEC, 30.0)):
+        with pytest.raises(DropspinError, match="holds another sweep: the specs or the time limits differ; choose another folder with -o"):
+            run_sweep(load_sweep(spec), where, resume=True, resources=ResourceLimits(processor_time=seconds))
     about = Path(where, "sweep.json")
     content = json.loads(about.read_text())
     content["provenance"]["versions"]["mujoco"], content["identity"] = "3.1", "0123456789ab"

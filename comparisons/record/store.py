@@ -64,9 +64,16 @@ class Record:
         self.folder = Path(folder)
 
     def write_releases(self, listed: Mapping[str, Sequence[str]]) -> None:
-        """Write which releases the index had, engine by engine; those of other engines stay."""
+        """Write which releases the index had, engine by engine; those of other engines stay.
+
+        Raises:
+            DropspinError: The file is damaged.
+        """
         path = self.folder / RELEASES
-        known = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+        try:
+            known = dict(json.loads(read_stored(self.folder, RELEASES))) if path.exists() else {}
+        except (ValueError, TypeError):
+            raise DropspinError(f"{path}: is damaged; delete it: dropspin record writes it again.") from None
         known |= {engine: {"listed": date.today().isoformat(), "releases": list(names)} for engine, names in listed.items()}
         with written_whole(path) as unfinished:
             unfinished.write_text(json.dumps(known, indent=1, sort_keys=True) + "\n", encoding="utf-8")

@@ -215,6 +215,15 @@ def test_unknown_engines_and_releases_are_refused(stub, tmp_path):
     assert stub.asked == []
 
 
+@pytest.mark.parametrize("text", ["{", "<<<<<<< HEAD\n{}", "3", "[1]"])
+def test_a_damaged_list_of_releases_is_refused_in_one_line(text, stub, tmp_path):
+    """As after a conflict of two branches, because the file is committed."""
+    (tmp_path / "record").mkdir()
+    (tmp_path / "record/_releases.json").write_text(text)
+    assert_refused(dropspin("record", "-e", "mujoco", "-o", "record", cwd=tmp_path), "_releases.json: is damaged; delete it")
+    assert stub.asked == []
+
+
 @pytest.fixture
 def installed(monkeypatch):
     """Call it with a name: in the place of pip, a package of this name and of version 9.9 is written into each new environment."""

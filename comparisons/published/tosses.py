@@ -47,7 +47,7 @@ def _states(file: Path, half_side: float) -> Array:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             [member] = [name for name in archive.namelist() if "/data/" in name]
             rows = np.frombuffer(archive.read(member)).reshape(-1, COLUMNS)
-    except (zipfile.BadZipFile, ValueError) as error:
+    except Exception as error:  # whatever zipfile raises for a damaged file
         raise DropspinError(f"{file}: is not a toss: {error}; give the folder of the cleaned tosses.") from None
     orientation = np.roll(rows[:, 3:7], -1, axis=1)
     spin = rotate(orientation, rows[:, 10:13])

@@ -1,5 +1,6 @@
 """Measured tosses as a source simulated them: their starts, their errors, their simulations in free flight, and wrong folders."""
 
+import io
 import zipfile
 
 import numpy as np
@@ -83,6 +84,18 @@ def test_simulated_flight_is_the_exact_one_with_the_engines_damping(engine, damp
     assert (turned.inv() * Rotation.from_quat(poses[:, 3:])).magnitude().max() < 2e-3
 
 
+def damaged(compression, encrypted):
+    """A ZIP archive whose member is no deflated data, is encrypted, or has an unknown method of compression."""
+    with zipfile.ZipFile(file := io.BytesIO(), "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("0/data/0", bytes(152))
+    content = bytearray(file.getvalue())
+    data, directory = content.index(b"0/data/0") + 8, content.index(b"PK\x01\x02")
+    content[data : data + 4] = b"\xff" * 4
+    content[6] = content[directory + 8] = encrypted
+    content[8] = content[directory + 10] = compression
+    return bytes(content)
+
+
 def test_wrong_folders_are_refused_in_one_line(tmp_path):
     def refused(*arguments):
         done = dropspin("reproduce", *arguments, cwd=tmp_path)
@@ -96,4 +109,7 @@ def test_wrong_folders_are_refused_in_one_line(tmp_path):
     assert "0.pt: is not a toss: File is not a zip file; give the folder of the cleaned tosses." in refused("acosta-cube", ".")
     write(tmp_path, np.zeros(7))
     assert "0.pt: is not a toss: cannot reshape array" in refused("acosta-cube", ".")
+    for compression, encrypted in ((8, 0), (8, 1), (97, 0)):
+        (tmp_path / "0.pt").write_bytes(damaged(compression, encrypted))
+        assert "0.pt: is not a toss: " in refused("acosta-cube", ".")
     assert "source 'nowhere' is unknown" in refused("nesc-brick", "nowhere")

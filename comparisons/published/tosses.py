@@ -6,6 +6,7 @@ Source: B. Acosta, W. Yang, M. Posa, Validating Robotics Simulators on Real-Worl
 import io
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
@@ -47,7 +48,7 @@ def _states(file: Path, half_side: float) -> Array:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             [member] = [name for name in archive.namelist() if "/data/" in name]
             rows = np.frombuffer(archive.read(member)).reshape(-1, COLUMNS)
-    except Exception as error:  # whatever zipfile raises for a damaged file
+    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError) as error:  # also for an encrypted file
         raise DropspinError(f"{file}: is not a toss: {error}; give the folder of the cleaned tosses.") from None
     orientation = np.roll(rows[:, 3:7], -1, axis=1)
     spin = rotate(orientation, rows[:, 10:13])

@@ -24,7 +24,7 @@ from dropspin import reference_impl, scenarios
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.engines.wang import reference_body, reference_world
-from dropspin.comparisons.running.recording import record_batch
+from dropspin.comparisons.running.driving import record_batch
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios.model import initial_states
 

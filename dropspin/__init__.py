@@ -60,8 +60,8 @@ if TYPE_CHECKING:
     from dropspin.comparisons.results.table import Measurement as Measurement
     from dropspin.comparisons.robustness.study import RobustnessStudy as RobustnessStudy
     from dropspin.comparisons.robustness.study import find_limits as find_limits
+    from dropspin.comparisons.running.driving import simulate as simulate
     from dropspin.comparisons.running.process_limits import ResourceLimits as ResourceLimits
-    from dropspin.comparisons.running.recording import simulate as simulate
     from dropspin.comparisons.running.run import DEFAULT_DTS as DEFAULT_DTS
     from dropspin.comparisons.running.run import measure as measure
     from dropspin.comparisons.running.run import run as run

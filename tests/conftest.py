@@ -104,7 +104,7 @@ def _all_start_phases_in_slow_tests(request):
 @pytest.fixture(scope="session", autouse=True)
 def _shared_functions(shared):
     """Compile what all kernels of Wang's method share, 5 s without numba's cache: engine processes, which are forked, have it then."""
-    from dropspin.comparisons.running.recording import simulate
+    from dropspin.comparisons.running.driving import simulate
 
     def compiled(folder: Path | None = None) -> None:
         simulate("drop-box-corner", "wang", 1e-2)

@@ -5,7 +5,7 @@ import pytest
 import support.detection_power
 from support.detection_power import FAULTS, SEQUENTIAL, SIZES, failures, faulty_engine, smallest_caught, sound_engine
 
-from dropspin.comparisons.running.recording import record
+from dropspin.comparisons.running.driving import record
 from dropspin.scenarios import load
 from dropspin.scenarios.state import SPIN, VELOCITY
 

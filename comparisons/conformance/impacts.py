@@ -24,7 +24,7 @@ from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.faults.mistakes import NOT_INVERTED, NOT_ROTATED, ROTATED_BACK, SQUARE
 from dropspin.comparisons.faults.parameters import FAULT_MODELS
 from dropspin.comparisons.measuring.comparison import Comparison
-from dropspin.comparisons.running.recording import Breakdown, record, try_record
+from dropspin.comparisons.running.driving import Breakdown, record, try_record
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.loading import from_mapping, read_toml
 from dropspin.scenarios.rotations import rotate

@@ -27,7 +27,7 @@ from dropspin.comparisons.faults.fault_model import FaultModel
 from dropspin.comparisons.faults.mistakes import MISTAKES, Mistake
 from dropspin.comparisons.faults.parameters import FAULT_MODELS
 from dropspin.comparisons.faults.shapes import SHAPE_FAULTS
-from dropspin.comparisons.running.recording import Breakdown, record, try_record
+from dropspin.comparisons.running.driving import Breakdown, record, try_record
 from dropspin.scenarios import Scenario, Trajectory, truth_for
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.truths import LAWS, Law

@@ -8,7 +8,7 @@ import numpy as np
 
 from dropspin.comparisons.conformance.outcomes import Declined
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.running.recording import record
+from dropspin.comparisons.running.driving import record
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.loading import from_mapping, read_toml
 from dropspin.scenarios.rotations import angle_between_orientations

@@ -18,7 +18,7 @@ from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of, overrides
 from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, PLANE, MuJoCoFile, set_options
 from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, kind_of, mesh_of, quaternion, shape_of
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM
-from dropspin.comparisons.running.recording import Breakdown
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
 from dropspin.scenarios.state import UP, Array
 from dropspin.scenarios.truths.soft_rest import GeomSettings, SoftContact

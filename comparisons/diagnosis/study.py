@@ -18,12 +18,12 @@ from dropspin.comparisons.diagnosis.remedies import Question, Targets, answers_t
 from dropspin.comparisons.diagnosis.sliding import creep, roll, slide
 from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.comparisons.engines.options import engine_name
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.bodies.mesh import openness
 from dropspin.scenarios.bodies.mesh_files import read_mesh

@@ -19,9 +19,9 @@ from dropspin.comparisons.logs.continued_tosses import Launches, launches, poses
 from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.intervals import resamples
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import rotation_vector
 from dropspin.scenarios.state import ORIENTATION, POSITION, Array

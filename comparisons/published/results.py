@@ -7,7 +7,7 @@ from decimal import Decimal
 from typing import Literal, NamedTuple
 
 from dropspin.comparisons.judging.verdicts import Verdict
-from dropspin.comparisons.running.recording import Breakdown
+from dropspin.comparisons.running.driving import Breakdown
 
 Status = Literal["reproduced", "differs", "error of the source", "not reproducible", "for comparison", "not run"]
 """Reproduced: the digits are equal, or the value is within the bound or tolerance that the source states. Differs: they are not, although

@@ -17,10 +17,10 @@ import numpy as np
 
 from dropspin.comparisons.published.results import SHOWN, Result, with_value
 from dropspin.comparisons.published.sources import Source
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.files import read_file
 from dropspin.scenarios.rotations import angle_between_orientations, length, rotate, rotation_vector

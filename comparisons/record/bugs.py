@@ -24,8 +24,8 @@ from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.record.environments import installed, last_line, python_of, run, without_paths
 from dropspin.comparisons.record.plan import load_plan
 from dropspin.comparisons.results.store import load_results
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.parallel import as_done
-from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.loading import read_toml

@@ -21,8 +21,8 @@ from typing import Any
 
 from dropspin.comparisons.engines.packages import is_npm, numbers_of
 from dropspin.comparisons.record.plan import Plan
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.processes import Closed
-from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
 

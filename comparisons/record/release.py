@@ -21,11 +21,11 @@ from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.results.folder import sha256
 from dropspin.comparisons.results.provenance import STAMPED
+from dropspin.comparisons.running.driving import Breakdown, divergence, record, record_batch, verify_accepted
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown, divergence, record, record_batch, verify_accepted
 from dropspin.comparisons.running.run import measure
 from dropspin.comparisons.running.start_phases import StartPhase, start_phases
 from dropspin.comparisons.running.timing import time_steps

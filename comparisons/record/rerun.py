@@ -11,7 +11,7 @@ from dropspin.comparisons.record.environments import measured
 from dropspin.comparisons.record.findings import Case, Release, read, release_of, rounding
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.record.store import BLANK, MACHINE, machine
-from dropspin.comparisons.running.recording import Breakdown
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
 

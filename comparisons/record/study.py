@@ -16,8 +16,8 @@ from dropspin.comparisons.record.environments import measured, prereleases, rele
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.record.store import Record, machine
 from dropspin.comparisons.running.cluster import connected
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.parallel import as_done
-from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios.errors import verify_known
 
 

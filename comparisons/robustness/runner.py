@@ -20,9 +20,9 @@ from dropspin.comparisons.robustness.failure_modes import (
     worst,
 )
 from dropspin.comparisons.robustness.operating_point import OperatingPoint, in_nominal_units
+from dropspin.comparisons.running.driving import Breakdown, record, verify_accepted
 from dropspin.comparisons.running.inputs import MOST_ROWS, EngineEntry, ignore
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown, record, verify_accepted
 from dropspin.comparisons.running.start_phases import start_phases
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 from dropspin.scenarios.state import RATES

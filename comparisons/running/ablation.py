@@ -14,8 +14,8 @@ from types import MappingProxyType
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.options import spelled
+from dropspin.comparisons.running.driving import verify_accepted
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.recording import verify_accepted
 from dropspin.comparisons.running.verification import verified_settings
 from dropspin.scenarios import DropspinError, Scenario
 

@@ -10,11 +10,11 @@ from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, EnsembleOutcome
+from dropspin.comparisons.running.driving import Breakdown, classify, record, record_batch, verify_accepted
 from dropspin.comparisons.running.engine_process import share_progress
 from dropspin.comparisons.running.ensembles import run_ensemble
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.progress import OnSimulations
-from dropspin.comparisons.running.recording import Breakdown, classify, record, record_batch, verify_accepted
 from dropspin.comparisons.running.uncertainty import simulations_of, uncertainties
 from dropspin.comparisons.running.verification import verified_claims, verified_predictions
 from dropspin.scenarios import Scenario, Trajectory, truth_for

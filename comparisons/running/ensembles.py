@@ -14,7 +14,7 @@ from dropspin.comparisons.measuring.batch import compute_states
 from dropspin.comparisons.measuring.states import States
 from dropspin.comparisons.measuring.tolerances import OF_TWO_DRAWS, tolerance
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, SAMPLES, EnsembleOutcome
-from dropspin.comparisons.running.recording import record_batch
+from dropspin.comparisons.running.driving import record_batch
 from dropspin.scenarios import Scenario, Trajectory, members
 from dropspin.scenarios.mechanics import angular_momentum
 from dropspin.scenarios.state import Array

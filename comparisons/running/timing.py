@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Engine, numpy_array
+from dropspin.comparisons.running.driving import Breakdown, classify, verify_accepted
 from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress
-from dropspin.comparisons.running.recording import Breakdown, classify, verify_accepted
 from dropspin.scenarios import Scenario
 
 TIMING_REPEATS = 3

@@ -21,7 +21,7 @@ import numpy as np
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.comparison import Comparison, at_times
 from dropspin.comparisons.measuring.metrics import metrics_for
-from dropspin.comparisons.running.recording import finite, record_batch
+from dropspin.comparisons.running.driving import finite, record_batch
 from dropspin.scenarios import Scenario, Trajectory, reference_for
 from dropspin.scenarios.recording import STARTS, Noise
 from dropspin.scenarios.rotations import about, length, multiply

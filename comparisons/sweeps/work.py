@@ -14,10 +14,10 @@ import pyarrow as pa
 from dropspin.comparisons.engines.stand_in import code_of
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.results.provenance import code, provenance, versions
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.sweeps.arrays import run_side_by_side
 from dropspin.comparisons.sweeps.jobs import Jobs, Sweep
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, Outcomes, concatenated, not_run, run_scenes, set_breakdown

@@ -21,8 +21,8 @@ from dropspin.comparisons.measuring.symmetries import BITWISE, kind_of
 from dropspin.comparisons.measuring.tolerances import EPS_PER_STEP, FEW_DRAWS, MATTERS
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.table import Measurement, as_table
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.perturbed_starts import PERTURBATION
-from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.state import Array
 

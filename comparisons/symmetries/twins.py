@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.differences import differences
 from dropspin.comparisons.measuring.motions import Motions
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scenes, ignore, verify_time_step
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.symmetries.findings import Finding, Status, judged
 from dropspin.comparisons.symmetries.study import DT, effects_of_rounding, states_of
 from dropspin.scenarios import DropspinError, Scenario, Trajectory

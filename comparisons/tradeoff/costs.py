@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.running.driving import Breakdown, classify
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.recording import Breakdown, classify
 from dropspin.comparisons.running.timing import (
     TIMING_REPEATS,
     TimedSteps,

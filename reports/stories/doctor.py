@@ -4,11 +4,11 @@ import sys
 from collections.abc import Sequence
 
 from dropspin.comparisons.results.provenance import processor, versions
+from dropspin.comparisons.running.driving import Breakdown, simulate
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import ONE_MINUTE
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown, simulate
 from dropspin.reports.document import Rows
 from dropspin.scenarios import DropspinError, load
 

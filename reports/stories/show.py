@@ -79,11 +79,11 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
     Raises:
         DropspinError: The engine cannot run, or breaks down while it builds the scene.
     """
+    from dropspin.comparisons.running.driving import Breakdown
     from dropspin.comparisons.running.entries import present_entry
     from dropspin.comparisons.running.inputs import verify_time_step
     from dropspin.comparisons.running.process_limits import ONE_MINUTE
     from dropspin.comparisons.running.processes import EngineProcesses
-    from dropspin.comparisons.running.recording import Breakdown
 
     verify_time_step(scene, dt)
     entry = present_entry(engine_name)

@@ -12,7 +12,7 @@ from dropspin.comparisons import calibration
 from dropspin.comparisons.calibration import calibrate, drop
 from dropspin.comparisons.engines.mujoco_model import damping_ratio
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.driving import simulate
 from dropspin.scenarios import DropspinError, load
 
 RESTITUTIONS = (0.0, 0.3, 0.5, 0.8, 0.95)

@@ -12,7 +12,7 @@ from support.settings import verify_defaults_are_in_force, verify_settings_are_i
 from dropspin import scenarios
 from dropspin.comparisons.conformance.checks import CHECKS
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.driving import simulate
 from dropspin.comparisons.running.run import measure
 
 STEPS = 100

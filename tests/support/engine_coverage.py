@@ -17,7 +17,7 @@ from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metric import Metric
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.measuring.tolerances import negligible
-from dropspin.comparisons.running.recording import record
+from dropspin.comparisons.running.driving import record
 from dropspin.comparisons.running.start_phases import start_phases
 from dropspin.scenarios import Scenario, Truth, load, truth_for
 from support.fault_suite import with_body, with_coefficient, with_gravity, with_restitution

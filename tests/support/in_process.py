@@ -11,10 +11,10 @@ from threading import RLock
 from unittest import mock
 
 from dropspin.comparisons.engines.stand_in import StandIn
+from dropspin.comparisons.running.driving import Breakdown, classify
 from dropspin.comparisons.running.engine_run import motions_from, run_engine
 from dropspin.comparisons.running.inputs import ignore
 from dropspin.comparisons.running.processes import Closed, EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown, classify
 
 REAL = {name: getattr(EngineProcesses, name) for name in ("start", "call", "renew")}
 _one_at_a_time = RLock()

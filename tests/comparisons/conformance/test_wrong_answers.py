@@ -5,7 +5,7 @@ from support import engines as made
 
 import dropspin as ds
 from dropspin.comparisons.conformance.checks import conform
-from dropspin.comparisons.running.recording import try_record
+from dropspin.comparisons.running.driving import try_record
 
 
 class ShortState(made.ExactSimulation):

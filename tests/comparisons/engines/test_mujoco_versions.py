@@ -17,7 +17,7 @@ from dropspin.comparisons.engines.packages import numbers_of
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.regressions.comparing import compare, history
 from dropspin.comparisons.results.store import load_results
-from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.driving import simulate
 from dropspin.scenarios.mechanics import kinetic_energy
 
 FREE_BODY = """

@@ -15,10 +15,10 @@ from support.tiny_engine import PACKAGE, TinyEngine, install
 from dropspin import scenarios
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.node_process import node
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown
 
 DT = 2e-3
 DRIVER = Path(__file__).parents[2] / "support" / "tiny_engine.cjs"

@@ -7,7 +7,7 @@ import pytest
 
 from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.running.recording import record, simulate
+from dropspin.comparisons.running.driving import record, simulate
 from dropspin.comparisons.running.run import run
 from dropspin.scenarios import DropspinError, Trajectory, load, truth_for
 from dropspin.scenarios.mechanics import kinetic_energy

@@ -10,7 +10,7 @@ from support.settings import verify_defaults_are_in_force, verify_settings_are_i
 from dropspin.comparisons.engines.mujoco_settings import SETTINGS, in_force
 from dropspin.comparisons.engines.options import Configured, Setting, spelled
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.driving import simulate
 from dropspin.comparisons.running.verification import verify_build
 from dropspin.reports.stories.show import built_rows, setting_rows
 from dropspin.scenarios import DropspinError, load

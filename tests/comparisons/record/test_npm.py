@@ -8,7 +8,7 @@ import pytest
 from dropspin.comparisons.record import environments
 from dropspin.comparisons.record.environments import measured
 from dropspin.comparisons.record.plan import Plan
-from dropspin.comparisons.running.recording import Breakdown
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.scenarios import DropspinError
 
 NPM = Plan.model_validate(

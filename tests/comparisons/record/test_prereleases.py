@@ -5,7 +5,7 @@ from support.cli import dropspin
 from support.small_record import rows
 
 from dropspin.comparisons.record import study
-from dropspin.comparisons.running.recording import Breakdown
+from dropspin.comparisons.running.driving import Breakdown
 
 VALUES = {"1.1.0": 12.7, "1.2.0rc1": 1e-3}
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.running.recording import record, record_batch
+from dropspin.comparisons.running.driving import record, record_batch
 from dropspin.scenarios import load
 from dropspin.scenarios.model import differ_in_start_alone
 from dropspin.scenarios.variations import with_other_numbers

@@ -15,7 +15,7 @@ from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.regressions.baseline import Baseline
 from dropspin.comparisons.regressions.checking import accept, check
-from dropspin.comparisons.running.recording import record_batch, simulate
+from dropspin.comparisons.running.driving import record_batch, simulate
 from dropspin.comparisons.running.run import measure, run
 from dropspin.comparisons.running.start_phases import compare, start_phases
 from dropspin.comparisons.running.uncertainty import uncertainties

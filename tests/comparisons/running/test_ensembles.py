@@ -10,8 +10,8 @@ from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
 from dropspin.comparisons.results.store import load_results, save
+from dropspin.comparisons.running.driving import record_batch
 from dropspin.comparisons.running.ensembles import judge_differences, judge_means, run_ensemble
-from dropspin.comparisons.running.recording import record_batch
 from dropspin.scenarios import load, members
 
 SCENE = load("drop-box-anyhow")

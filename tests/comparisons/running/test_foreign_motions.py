@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dropspin.comparisons.engines.registry import engine as engine_named
-from dropspin.comparisons.running.recording import record
+from dropspin.comparisons.running.driving import record
 from dropspin.comparisons.running.run import measure
 from dropspin.scenarios import DropspinError, Trajectory, load, truth_for
 

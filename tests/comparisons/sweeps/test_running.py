@@ -19,9 +19,9 @@ import pytest
 from support import engines as test_engines
 
 from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import Closed
-from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.sweeps.folder import read_sweep
 from dropspin.comparisons.sweeps.running import run_sweep
 from dropspin.comparisons.sweeps.spec import load_sweep

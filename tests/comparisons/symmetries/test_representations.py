@@ -7,7 +7,7 @@ import pytest
 from support import engines as made
 
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.driving import simulate
 from dropspin.comparisons.symmetries.study import symmetries
 from dropspin.scenarios import DropspinError, load
 from dropspin.scenarios.variations import heavy_neighbour

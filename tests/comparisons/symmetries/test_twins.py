@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import engines as made
 
-from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.driving import simulate
 from dropspin.comparisons.symmetries.twins import twins
 from dropspin.scenarios import DropspinError, load
 

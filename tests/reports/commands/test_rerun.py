@@ -10,7 +10,7 @@ from support.small_record import HOSTILE, rows, write_record
 from dropspin.comparisons.record import rerun
 from dropspin.comparisons.record.findings import release_of
 from dropspin.comparisons.record.store import BLANK, machine
-from dropspin.comparisons.running.recording import Breakdown
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.reports.commands.record_rerun import record_rerun_command
 from dropspin.scenarios import DropspinError
 

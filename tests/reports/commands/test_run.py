@@ -14,8 +14,8 @@ from support.cli import Started, dropspin
 
 from dropspin.comparisons.engines.mujoco_engine import MuJoCo
 from dropspin.comparisons.running import run as running
+from dropspin.comparisons.running.driving import simulate
 from dropspin.comparisons.running.process_limits import ResourceLimits
-from dropspin.comparisons.running.recording import simulate
 from dropspin.reports.run_folder import MeasuredScenes
 from dropspin.reports.stories.failures import failures
 from dropspin.scenarios import load

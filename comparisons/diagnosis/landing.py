@@ -50,7 +50,7 @@ def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         return []
     answers = [rebound(body, dts, speed, REBOUND) for speed in IMPACTS]
     if "restitution" in body.remedies:
-        lively = body.tried(("restitution",))
+        lively = body.tried(("restitution",), body.facts.dt)
         answers += [rebound(lively, dts, speed, f"{REBOUND} on a surface with restitution 1") for speed in IMPACTS]
     found = _impacts(body, 1.0, dts[0], PHASES)
     blank = Answer("impact", "", "1", speed=1.0, detail=found.failure)

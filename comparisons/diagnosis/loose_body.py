@@ -231,9 +231,15 @@ class LooseBody(ABC):
         """The body with other settings."""
 
     @cached_property
-    def tried(self) -> Callable[[tuple[str, ...]], "LooseBody"]:
-        """The function from settings to the body with their remedies, made once."""
-        return cache(lambda settings: self.changed(self.changes(settings)) if settings else self)
+    def tried(self) -> Callable[[tuple[str, ...], float], "LooseBody"]:
+        """The function from settings and a time step [s] to the body with their remedies and that step in its file, made once."""
+
+        @cache
+        def body(settings: tuple[str, ...], dt: float) -> LooseBody:
+            changes = {**self.changes(settings), **({"timestep": dt} if dt != self.facts.dt else {})}
+            return self.changed(changes) if changes else self
+
+        return body
 
     def changes(self, settings: Sequence[str]) -> Changes:
         """The changes of the remedies of some settings."""

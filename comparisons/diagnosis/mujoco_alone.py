@@ -173,17 +173,19 @@ class MuJoCoAlone:
             spec.add_pair(geomname1="surface", geomname2=f"own {self.geoms.index(geom)}", **self.in_force_of(geom))
 
     def in_force_of(self, geom: int) -> dict[str, Any]:
-        """The settings in force of the contact of a geometry, with the time constant that MuJoCo raises to two of the file's steps."""
+        """The settings in force of the contact of a geometry, with the time constant that MuJoCo raises to two time steps.
+
+        Of the file, whatever step is simulated: as dt → 0 the contact stays the same. Of another step if that is tried as a remedy.
+        """
         pair = self.pairs[geom]
         changed = {name: np.array(str(self._changes[name]).split(), float) for name in ("solref", "solimp") if name in self._changes}
         still = {"margin": 0.0, "gap": 0.0} if "margin" in self._changes else {}
         return pair | {"solref": self.clamped(pair)} | ({} if overrides(self.file.model) else changed | still)
 
     def clamped(self, pair: Mapping[str, Any]) -> Array:
-        """The time constant and the damping ratio that are in force at the file's time step."""
-        constant, ratio = pair["solref"]
-        is_raised = constant > 0.0 and self.file.is_safe
-        return np.array([max(constant, 2.0 * self.file.model.opt.timestep) if is_raised else constant, ratio])
+        """The time constant and the damping ratio that are in force at the time step of the file, or of a remedy."""
+        (constant, ratio), dt = pair["solref"], float(self._changes.get("timestep", self.file.model.opt.timestep))
+        return np.array([max(constant, 2.0 * dt) if constant > 0.0 and self.file.is_safe else constant, ratio])
 
     @property
     def contact(self) -> SoftContact | None:

@@ -98,7 +98,7 @@ def answers_to(question: Question, body: LooseBody, targets: Targets = NO_TARGET
         """The answers with the remedies of settings, or with a set of them reverted alone, at a time step [s]; none of a breakdown."""
         with suppress(Diverged):
             if isinstance(settings, tuple):
-                return question(body.tried(settings), [step])
+                return question(body.tried(settings, step), [step])
             return question(body.changed({name: body.remedies[name][name] for name in settings}), [step])
         return []
 

@@ -3,6 +3,7 @@
 import pytest
 from support.model_files import FREE, body_of, findings_of
 
+from dropspin.comparisons.diagnosis.landing import impact
 from dropspin.comparisons.diagnosis.remedies import answers_to
 from dropspin.comparisons.diagnosis.sliding import roll, slide
 
@@ -21,6 +22,14 @@ def test_ball_that_a_contact_slows_is_due_to_the_contact(tmp_path):
     geom = '<geom name="g" size=".1" solimp=".5 .01 .01 .5 2" solref="-100 -5"/>'
     [answer] = answers_to(roll, body_of(tmp_path, FREE.format(geom), 'cone="elliptic"'))
     assert [found.kind for found in answer.findings] == ["setting"]
+
+
+def test_time_step_of_a_remedy_is_tried_as_if_the_file_had_it(tmp_path):
+    """MuJoCo raises the time constant of a contact to two time steps: to 10 ms at 5 ms, and not at 1.25 ms."""
+    ball = FREE.format('<geom size=".1" mass="1" solref=".004 1" priority="1"/>')
+    tried, written = (body_of(tmp_path, ball, f'timestep="{dt}"') for dt in (0.005, 0.00125))
+    answers = [[one.measured for one in impact(body, [0.00125])] for body in (tried.tried((), 0.00125), written)]
+    assert answers[0] == answers[1] != [one.measured for one in impact(tried, [0.00125])]
 
 
 def test_free_joint_keeps_its_name(tmp_path):

@@ -29,7 +29,7 @@ class Stubborn:
     def __init__(self):
         self.dts = []
 
-    def tried(self, settings):
+    def tried(self, settings, dt):
         return self
 
     def changes(self, settings):
@@ -66,7 +66,7 @@ def test_setting_is_named_if_it_explains_most_of_an_error(left, settings, remedi
     class Body(Stubborn):
         error = 0.11
 
-        def tried(self, settings):
+        def tried(self, settings, dt):
             changed = Body()
             changed.error = left if settings else 0.11
             return changed

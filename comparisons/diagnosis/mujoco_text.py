@@ -41,11 +41,14 @@ class BodyText:
         file: The file.
         head: The number of the body.
         surface: The number of the geometry that it lands on.
-        contacts: The settings of the contacts with it, by the numbers of the geometries that touch it.
+        touching: The numbers of the geometries that touch it.
+        contacts: The settings of the contacts with it, by the numbers of all geometries that collide with it.
     """
 
-    def __init__(self, file: MuJoCoFile, head: int, surface: int | None, contacts: Mapping[int, Mapping[str, Any]]) -> None:
-        self._file, self._head, self._surface, self._contacts = file, head, surface, contacts
+    def __init__(
+        self, file: MuJoCoFile, head: int, surface: int | None, touching: Sequence[int], contacts: Mapping[int, Mapping[str, Any]]
+    ) -> None:
+        self._file, self._head, self._surface, self._touching, self._contacts = file, head, surface, touching, contacts
         self._model, self._group = file.model, file.group(head)
 
     @cached_property
@@ -123,7 +126,7 @@ class BodyText:
     @property
     def _in_contact(self) -> list[int]:
         """The geometries that touch, or all if none does, and the one that the body lands on."""
-        touching = list(self._contacts) or [geom for geom, body in enumerate(self._model.geom_bodyid) if body in self._group]
+        touching = list(self._touching) or [geom for geom, body in enumerate(self._model.geom_bodyid) if body in self._group]
         return touching if self._surface is None else [*touching, self._surface]
 
     @property
@@ -134,12 +137,12 @@ class BodyText:
 
     def _elements(self, geoms: Sequence[int]) -> list[Element]:
         """The elements that set a contact: the pairs, and those of geometries."""
-        return [*self._pairs, *filter(None, (geom_element(self._file, geom) for geom in geoms))]
+        pairs = [self._pair(geom) for geom in self._touching]
+        return list(filter(None, [*pairs, *(geom_element(self._file, geom) for geom in geoms)]))
 
-    @cached_property
-    def _pairs(self) -> list[Element]:
-        """The pairs of the file whose settings are those of the contact."""
-        return list(filter(None, (pair_element(self._file, geom, self._surface) for geom in self._contacts if self._surface is not None)))
+    def _pair(self, geom: int) -> Element | None:
+        """The pair of the file that sets the contact of a geometry."""
+        return None if self._surface is None else pair_element(self._file, geom, self._surface)
 
     def patch(self, options: Mapping[str, object], others: Mapping[str, object]) -> str:
         """Elements to write for changes of options, and of the joint, the geometries and the body: changed ones with their lines.
@@ -165,7 +168,7 @@ class BodyText:
         if "gravcomp" in others:
             found += [body.changed({"gravcomp": others["gravcomp"]}) for body in self._bodies if "gravcomp" in body.attributes]
         if contact := {name: value for name, value in others.items() if name in ("solref", "solimp", "margin")}:
-            found += [pair.changed(contact) for pair in self._pairs] or self._contact_of_geoms(contact)
+            found += self._with_contact(contact)
         return ", ".join(map(str, found)) or " ".join(f'{name}="{value}"' for name, value in others.items())
 
     def _freed(self, joint: Element) -> Setting:
@@ -173,12 +176,16 @@ class BodyText:
         kept = {name: value for name, value in joint.attributes.items() if name in ("name", "group")}
         return Setting(f"{tagged('freejoint', kept)}/>", joint.file, joint.line)
 
-    def _contact_of_geoms(self, changes: Mapping[str, object]) -> list[Setting]:
-        """The geometries with other settings of the contact: margins add, and of the others those of the larger priority count alone."""
+    def _with_contact(self, changes: Mapping[str, object]) -> list[Setting]:
+        """The pairs, and geometries without one, with other settings: margins add, of others those of the larger priority count alone."""
+        pairs = {number: pair for number in self._contacts if (pair := self._pair(number)) is not None}
+        found = [pair.changed(changes) for pair in pairs.values()]
+        alone = [number for number in self._contacts if number not in pairs]
         if "margin" in changes:
-            return [geom.changed({"margin": 0}) for geom in self._elements(self._in_contact) if mjcf_setting(geom, "margin") is not None]
-        found = []
-        for number, contact in self._contacts.items():
+            elements = filter(None, (geom_element(self._file, geom) for geom in (*alone, self._surface) if alone and geom is not None))
+            return found + [geom.changed({"margin": 0}) for geom in elements if mjcf_setting(geom, "margin") is not None]
+        for number in alone:
+            contact = self._contacts[number]
             kept = {"friction": contact["friction"][OF_GEOM], "condim": np.array([contact["condim"]])}
             kept = {name: value for name, value in kept.items() if np.any(value != getattr(self._model, f"geom_{name}")[number])}
             texts = {name: " ".join(f"{one:g}" for one in value) for name, value in kept.items()}
@@ -273,10 +280,7 @@ class BodyText:
         yield "visual", words, f"counted in the mass with {has.mass - least.mass:.4g} kg, by density, although it collides with nothing"
 
     def _changed(self, name: str, made: str) -> Ignored:
-        """A quantity that the compiler changes, with what is written, and the settings of which each alone makes a difference.
-
-        That with the largest effect comes first.
-        """
+        """A quantity that the compiler changes, with what is written, and the settings that do so, that of the largest effect first."""
         found = {setting: option_setting(self._file.source, "compiler", setting, "") for setting in (*NEUTRAL, "balanceinertia")}
         effects = {setting: self._effect(setting, name) for setting, words in found.items() if words.file}
         why = [found[setting] for setting in sorted(effects, key=effects.__getitem__, reverse=True) if effects[setting]]

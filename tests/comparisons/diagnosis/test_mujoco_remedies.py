@@ -3,10 +3,11 @@
 import pytest
 from support.model_files import FREE, body_of, findings_of
 
-from dropspin.comparisons.diagnosis.landing import impact
+from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.remedies import answers_to
 from dropspin.comparisons.diagnosis.sliding import roll, slide
 
+PADS = (("pad", 0.05, 0.004), ("rim", 0.049, 0.003))
 BOX = '<geom type="box" size=".1 .1 .1" mass="1" {}/>'
 
 
@@ -30,6 +31,16 @@ def test_time_step_of_a_remedy_is_tried_as_if_the_file_had_it(tmp_path):
     tried, written = (body_of(tmp_path, ball, f'timestep="{dt}"') for dt in (0.005, 0.00125))
     answers = [[one.measured for one in impact(body, [0.00125])] for body in (tried.tried((), 0.00125), written)]
     assert answers[0] == answers[1] != [one.measured for one in impact(tried, [0.00125])]
+
+
+def test_remedy_of_a_margin_names_all_geometries_that_it_is_tried_on(tmp_path):
+    """Without the margin of the rim, which does not touch, the body would rest on it."""
+    pad, rim = (f'<geom name="{name}" type="box" size=".05 .05 {height}" margin="{margin}"/>' for name, height, margin in PADS)
+    [found] = [found for answer, found in findings_of(body_of(tmp_path, FREE.format(pad + rim)), rest) if answer.quantity == "penetration"]
+    assert found.remedies[0].value == pytest.approx(1e-4, rel=0.5)
+    assert [f'name="{name}" type="box" size=".05 .05 {height}" margin="0"' in found.remedies[0].text for name, height, _ in PADS] == [
+        True
+    ] * 2
 
 
 def test_free_joint_keeps_its_name(tmp_path):

@@ -238,7 +238,7 @@ def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:
             yield Finding("below", -height, 0.0, toss)
         return
     wide, off = found.half_widths(alarm), header.tracked_from_centre - found.values[OFFSET]
-    by_scale = (abs(found.values[1] / header.gravity + 1.0) + wide[1] / header.gravity) * float(np.mean(resting.expected))
+    by_scale = (abs(found.values[1] / header.gravity + 1.0) + wide[1] / header.gravity) * float(np.mean(np.abs(resting.expected)))
     by_point = float(np.linalg.norm(np.abs(off) + wide[OFFSET]))
     if abs(above) > 4.0 * error + by_scale + by_point + RESTS_NEAR * header.body.size:
         height = round(header.floor_height + above, 4)

@@ -1,8 +1,9 @@
 """What the frames at rest show: heights on known faces, which give the scale of lengths and where the tracked point is.
 
-    height = s (-mean_k (R (r_k - p))_y) + R_y · δ,    k the lowest vertices
+    height = s (h - mean_k (R (r_k - p))_y) + R_y · δ,    k the lowest vertices
 
-s is the scale of the recorded lengths, r_k the vertices and p the tracked point in the frame of the shape, δ the error of p.
+s is the scale of the recorded lengths, h the height of the floor, r_k the vertices and p the tracked point in the frame of the shape, δ
+the error of p.
 """
 
 from typing import NamedTuple
@@ -31,8 +32,8 @@ class Rests(NamedTuple):
 
     Attributes:
         orientations: At rest, shape (k, 4).
-        heights: Of the tracked point above the floor [m], shape (k,).
-        expected: The same by the shape [m], shape (k,).
+        heights: Of the tracked point in the recording [m], shape (k,).
+        expected: The same by the shape and the floor of the header [m], shape (k,).
     """
 
     orientations: Array
@@ -64,14 +65,15 @@ def rests(log: Log) -> Rests:
     """The tosses of a recording whose last frames do not move."""
     body, found = log.header.body, [toss for toss in log.tosses if _is_still(toss, log.header.body.size)]
     orientations = np.array([toss.orientation[-1] for toss in found]).reshape(-1, 4)
-    heights = np.array([toss.position[-FEWEST_FRAMES:, 1].mean() for toss in found])
+    floor = log.header.floor_height
+    heights = floor + np.array([toss.position[-FEWEST_FRAMES:, 1].mean() for toss in found])
     offsets = rotate(orientations[:, np.newaxis], body.vertices - log.header.tracked_from_centre)[..., 1]
     if not found:
         return Rests(orientations, heights, heights)
     lowest = offsets.min(axis=1, keepdims=True)
     # A face that is not quite level in the record rests as the mean of its corners does.
     level = np.mean(offsets, axis=1, where=offsets < lowest + LEVEL * body.size)
-    return Rests(orientations, heights, depth_below_centre(orientations, body.semi_axes) - level)
+    return Rests(orientations, heights, floor + depth_below_centre(orientations, body.semi_axes) - level)
 
 
 def level_share(log: Log) -> tuple[float, int]:

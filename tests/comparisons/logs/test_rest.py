@@ -26,21 +26,23 @@ FACES = {  # orientations in which an axis of the body is up or down, and the ha
 }
 
 
-def resting(scale: float, error: Array, tilt: float = 0.0) -> Log:
+def resting(scale: float, error: Array, tilt: float = 0.0, floor: float = 0.0) -> Log:
     """A brick on each face, turned about the vertical; the tracked point is at `error` [m] from the centre, which the header gives."""
     tosses = []
     for number, (orientation, half) in enumerate(FACES.values()):
         turned = multiply(about(np.array([0.0, 1.0, 0.0]), np.asarray(0.3 * number)), orientation)
-        height = scale * (half + rotate(turned, error)[1])
+        height = scale * (floor + half + rotate(turned, error)[1]) - floor
         record = multiply(about(np.array([0.6, 0.0, 0.8]), np.asarray(tilt)), turned)
         rows = np.ones((12, 1))
         tosses.append(Toss(str(number), np.arange(12) / 100.0, rows * [0.1, height, 0.2], rows * record))
-    return Log(Header.model_validate({"data": "made", "rate": 100.0, "body": BRICK}), tuple(tosses), "made", ())
+    header = {"data": "made", "rate": 100.0, "body": BRICK, "floor_height": floor}
+    return Log(Header.model_validate(header), tuple(tosses), "made", ())
 
 
-def test_scale_and_tracked_point_are_exact() -> None:
+@pytest.mark.parametrize("floor", [0.0, 0.7, -0.4])
+def test_scale_and_tracked_point_are_exact(floor: float) -> None:
     error = np.array([0.001, -0.002, 0.003])
-    scale, _, found, _ = rests(resting(0.98, error)).scale()
+    scale, _, found, _ = rests(resting(0.98, error, floor=floor)).scale()
     assert scale == pytest.approx(0.98, abs=1e-12)
     np.testing.assert_allclose(found, 0.98 * error, atol=1e-12)
 

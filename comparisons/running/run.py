@@ -71,6 +71,7 @@ def run(
     Raises:
         DropspinError: An engine is unknown, a time step is impossible, or two scenes have the same name.
     """
+    engines = several("engines", engines)
     requested, entries, dts, stamp = _request(scenes, engines, dt, resources, quick)
     earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if not what_changed(part.provenance, stamp)}
     parts: dict[str, Results] = {}
@@ -85,6 +86,7 @@ def run(
         parts[scene.name] = replace(earlier[scene.model_dump_json()], scenes={scene.name: scene})
         for entry, step in product(entries, dts):
             report(Progress(scene.name, entry.label, step, finished=True))
+    reused = list(parts.values())
     pending = [own for own in requested if own.scene.name not in parts]
     for own in pending[:1]:
         compile_states(own.scene)
@@ -106,7 +108,11 @@ def run(
         work_in_parallel(iter(pending), of_scene, crews, on_done)
     compiled = [(label, timing.compilation) for (_, label, _), timing in timings.items() if timing.compilation > 0.0]
     stamp["compilation"] = {label: max(longest for one, longest in compiled if one == label) for label, _ in compiled}
-    return joined([parts[own.scene.name] for own in requested], stamp)
+    results = joined([parts[own.scene.name] for own in requested], stamp)
+    if any(what_changed(part.provenance, results.provenance) for part in reused):  # of the versions that engines report
+        chosen = [own.scene for own in requested]
+        return run(chosen, engines, dts, on_progress=on_progress, resources=resources, keep=keep, jobs=jobs, quick=quick)
+    return results
 
 
 def _request(
@@ -152,7 +158,16 @@ def what_changed(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> str:
     words = {"engines": "the engines", "dts": "the time steps", "time_limit": "the time limit", "quick": "the option --quick"}
     words |= {"code": "dropspin", "cpu": "the processor"}
     rest = [name for name in ("versions", "python", "cpu", "code") if earlier[name] != stamp[name]]
+    then, now = _reported_versions(earlier), _reported_versions(stamp)
+    codes += [f"the version of {label}" for label in then if label in now and then[label] != now[label]]
     return " and ".join([*(words.get(name, name) for name in asked), *([] if asked else codes), *(words.get(name, name) for name in rest)])
+
+
+def _reported_versions(stamp: Mapping[str, Any]) -> dict[str, set[str]]:
+    """The versions that the engines reported in their scenes, such as those of a package that `versions` does not name."""
+    cases = {label: of_scenes.values() for label, of_scenes in stamp.get("settings", {}).items()}
+    reported = {label: {str(one["version"]) for one in settings if "version" in one} for label, settings in cases.items()}
+    return {label: found for label, found in reported.items() if found}
 
 
 def measure(scene: SceneLike, motion: Trajectory) -> dict[str, float]:

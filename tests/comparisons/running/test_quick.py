@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from support import engines as made
 from support.cli import assert_refused, dropspin
+from support.engines import Exact, ExactSimulation
 
 import dropspin as ds
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
+from dropspin.comparisons.running.run import what_changed
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 
 DT = 8e-3
@@ -106,3 +108,30 @@ def test_results_of_a_quick_run_do_not_resume_a_full_one():
     quick = ds.run("spin-principal", "wang", DT, quick=True)
     ds.run("spin-principal", "wang", DT, done=[quick], keep=calls.append)
     assert len(calls) == 1
+
+
+def test_results_of_another_version_of_an_engine_are_measured_again():
+    """Which is known once the engine has simulated a scene; a reported version that changes from scene to scene ends nothing."""
+
+    def run(scenes, version, done=()):
+        calls = []
+        engine = engine_of_version(version)
+        results = ds.run(scenes, engine, DT, quick=True, done=done, keep=lambda part: calls.append(next(iter(part.scenes))))
+        return results, calls
+
+    def engine_of_version(version):
+        def prepare(self, scene, dt):
+            simulation = ExactSimulation(scene, dt)
+            simulation.settings = {"version": version or scene.name}
+            return simulation
+
+        return type("Versioned", (Exact,), {"name": "versioned", "prepare": prepare})()
+
+    first, second = ("spin-principal", "fall-spin")
+    old, _ = run([first], "1.0")
+    assert run([first, second], "1.0", [old])[1] == [second]
+    results, calls = run([first, second], "2.0", [old])
+    assert calls == [second, first, second]
+    assert what_changed(old.provenance, results.provenance) == "the version of versioned"
+    changing, _ = run([first], "")
+    assert run([first, second], "", [changing])[1] == [second, first, second]

@@ -11,15 +11,18 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+INTERRUPTS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""Ctrl-C, an order to end, and the end of the terminal, which Windows lacks."""
+
 
 @contextmanager
 def interrupts_deferred() -> Iterator[None]:
-    """Handle SIGINT and SIGTERM at the end of the context, which is to be short, if it runs in the main thread; others get none."""
+    """Handle `INTERRUPTS` at the end of the context, which is to be short, if it runs in the main thread; others get none."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     found: list[tuple[int, FrameType | None]] = []
-    handlers = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {one: signal.getsignal(one) for one in INTERRUPTS}
     deferred = {one: handler for one, handler in handlers.items() if callable(handler)}
     for one in deferred:
         signal.signal(one, lambda number, frame: found.append((number, frame)))

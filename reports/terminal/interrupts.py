@@ -1,15 +1,18 @@
-"""Handlers of Ctrl-C and SIGTERM. Interrupts are recorded, so that they stop the command even if a callback suppresses the exception."""
+"""Handlers of Ctrl-C, SIGTERM and SIGHUP; they record interrupts, which stop a command even if a callback suppresses the exception."""
 
 import signal
 import sys
+
+from dropspin.comparisons.results.interrupts import INTERRUPTS
 
 _interrupts: list[int] = []
 
 
 def handle_interrupts() -> None:
-    """Treat SIGTERM like Ctrl-C from now on, so that unfinished files are removed; record both."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _interrupt)
+    """Treat other interrupts like Ctrl-C from now on, so that unfinished files are removed; record them."""
+    for number in INTERRUPTS:
+        if number in (signal.SIGINT, signal.SIGTERM) or signal.getsignal(number) is not signal.SIG_IGN:  # as it is under nohup
+            signal.signal(number, _interrupt)
     sys.unraisablehook = _report_unless_interrupted
 
 

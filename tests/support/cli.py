@@ -20,6 +20,8 @@ from unittest import mock
 
 from pebble import ProcessPool
 
+from dropspin.comparisons.results.interrupts import INTERRUPTS
+
 TERMINAL = {"FORCE_COLOR": "1", "TERM": "dumb"}
 """The environment in which output is that of a terminal of 80 columns, without colours."""
 DROPSPIN = Path(sys.executable).with_name("dropspin")
@@ -127,7 +129,7 @@ def spawn(*arguments: object, cwd: Path | str, timeout: float = 300.0, **environ
 @contextlib.contextmanager
 def _unchanged_handlers() -> Iterator[None]:
     """Put back the signal handlers and the hook that the command line sets."""
-    handlers = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {one: signal.getsignal(one) for one in INTERRUPTS}
     hook = sys.unraisablehook
     try:
         yield

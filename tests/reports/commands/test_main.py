@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import tomllib
+from contextlib import nullcontext
 from pathlib import Path
 from unittest import mock
 
@@ -15,11 +16,13 @@ from support.cli import Started, dropspin, spawn
 
 import dropspin as ds
 from dropspin.comparisons.judging.verdicts import MARKS
+from dropspin.comparisons.results.interrupts import INTERRUPTS
 from dropspin.comparisons.robustness import study
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ONE_MINUTE
 from dropspin.reports.commands import main as cli
 from dropspin.reports.commands.limits import limits_command
 from dropspin.reports.commands.run import run_command
+from dropspin.reports.terminal import interrupts
 from dropspin.reports.terminal.streams import unfailing
 
 ROOT = Path(__file__).parents[3]
@@ -169,7 +172,7 @@ def test_terminals_without_utf_8(encoding, tmp_path, monkeypatch):
         monkeypatch.setattr(sys, "argv", ["dropspin", *arguments])
         for name in ("stdout", "stderr"):
             monkeypatch.setattr(sys, name, io.TextIOWrapper(io.BytesIO(), encoding=encoding))
-        handlers = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+        handlers = {one: signal.getsignal(one) for one in INTERRUPTS}
         with pytest.raises(SystemExit) as end:
             cli.main()
         for one, handler in handlers.items():
@@ -212,6 +215,24 @@ def test_an_interrupted_run_leaves_nothing(how, tmp_path):
     assert errors.splitlines()[-1] == "dropspin: interrupted; nothing was written."
     assert "Traceback" not in errors
     assert os.listdir(tmp_path) == ["long.toml"]
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows has no SIGHUP")
+def test_the_end_of_the_terminal_is_an_interrupt_unless_it_is_ignored(monkeypatch):
+    """As nohup ignores it."""
+    monkeypatch.setattr(interrupts, "_interrupts", [])
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    before = {one: signal.getsignal(one) for one in INTERRUPTS}
+    try:
+        for handler in (signal.SIG_IGN, signal.SIG_DFL):
+            signal.signal(signal.SIGHUP, handler)
+            interrupts.handle_interrupts()
+            with pytest.raises(KeyboardInterrupt) if handler is signal.SIG_DFL else nullcontext():
+                signal.raise_signal(signal.SIGHUP)
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+    assert interrupts._interrupts == [signal.SIGHUP]
 
 
 def test_an_interrupt_that_becomes_another_error_is_an_interrupt(monkeypatch, tmp_path):

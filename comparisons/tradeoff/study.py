@@ -166,7 +166,8 @@ def _with_costs(
     batches = np.full((len(steps), len(worlds), BATCH_ROUNDS), np.nan)
     for number in range(BATCH_ROUNDS):
         for entry, ladder in ladders:
-            rows = [row for row, (owner, _, _) in enumerate(steps) if owner is entry]
+            # A time step at which a single simulation diverges until it is timed is no fault of the batch.
+            rows = [row for row, (owner, _, _) in enumerate(steps) if owner is entry and np.isfinite(costs[row]).all()]
             dts = [steps[row][1] for row in rows]
             for column, size in enumerate(worlds):
                 found = processes.call(entry, costs_per_world, scene, dts, size)

@@ -404,6 +404,36 @@ def test_time_steps_without_an_error_have_the_reason(engine, why, monkeypatch):
     assert (f": {why}" in ladder.left_out) == isinstance(engine, Never)
 
 
+class Growing(Exact):
+    """Diverges soon after the end of the scene at the coarsest time step, alone and in a batch."""
+
+    name = "growing"
+
+    def prepare(self, scene, dt):
+        simulation = ExactSimulation(scene, dt)
+        advance = simulation.advance
+
+        def diverging(steps):
+            advance(steps)
+            if dt > 0.3 and simulation._step > scene.steps(dt):
+                raise Diverged("too fast")
+
+        simulation.advance = diverging
+        return simulation
+
+    def prepare_batch(self, members, dt):
+        return Together([self.prepare(member, dt) for member in members])
+
+
+def test_batch_that_diverges_where_a_single_simulation_does_has_no_fault(monkeypatch):
+    monkeypatch.setattr(errors, "MOST_STEPS", 30)
+    found = tradeoff(SHORT, Growing(), worlds=[2])
+    [ladder] = found.ladders
+    assert (ladder.verdict, ladder.no_batch_cost) == (None, "")
+    assert [dt for dt, _ in ladder.steps][1:] == [point.dt for point in found.points if 2 in point.costs_per_world]
+    assert ladder.steps[0][0] > 0.3 > ladder.steps[1][0]
+
+
 @pytest.fixture
 def _processor_time_of_the_steps(monkeypatch):
     monkeypatch.setattr(errors, "processor_time", lambda: Clock.now)

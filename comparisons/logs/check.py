@@ -14,19 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.logs.falling import flights_in_any_units
-from dropspin.comparisons.logs.flight import (
-    ACCELERATION,
-    OFFSET,
-    positions,
-)
+from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, Flight, falls, positions
 from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
 from dropspin.comparisons.logs.log import Cause, Finding, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
-from dropspin.comparisons.logs.recording_faults import of_floor, of_frames, of_quaternions, of_rates, orders_of_axes
+from dropspin.comparisons.logs.recording_faults import in_other_readings, of_floor, of_frames, of_quaternions, of_rates, orders_of_axes
 from dropspin.comparisons.logs.rest import rests
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.bodies.inertia import is_diagonal
+from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import unrotate
 from dropspin.scenarios.state import UP, Array
 from dropspin.scenarios.validation import validated
@@ -116,7 +113,17 @@ def log_check(recording: Flights | Log | str | Path) -> Check:
         DropspinError: The recording cannot be loaded, or no toss has a free flight.
     """
     log = load_log(recording) if isinstance(recording, str | Path) else recording
-    flights = flights_in_any_units(log, ALARM) if isinstance(log, Log) else log
+    if isinstance(log, Log):
+        try:
+            flights = flights_in_any_units(log, ALARM)
+        except DropspinError:
+            reading, read = max(in_other_readings(log), key=lambda one: sum(map(len, _falls_in(one[1]))))
+            if 2 * len(_falls_in(read)) < len(log.tosses):
+                raise
+            check = log_check(read)
+            return replace(check, findings=(reading, *check.findings))
+    else:
+        flights = log
     drag = regression([positions(flight, with_drag=True) for flight in flights.found])
     found = [*_of_units(flights), *of_quaternions(flights.log, flights), *of_rates(flights), *of_frames(flights)]
     values = tuple(_values(flights, drag))
@@ -129,6 +136,11 @@ def log_check(recording: Flights | Log | str | Path) -> Check:
     found += [Finding("misread", toss=flight.toss.name, frame=frame) for flight in flights.found for frame in flight.misread]
     found += [*_of_scale(flights, drag), *off, *_of_inertia(flights, drag, values), *of_floor(flights, ALARM)]
     return replace(check, findings=tuple(found))
+
+
+def _falls_in(log: Log) -> list[Flight]:
+    """The falls of the tosses with the header's gravity."""
+    return [fall for fall in falls(log, np.array([0.0, -log.header.gravity, 0.0])) if fall is not None]
 
 
 def _of_units(flights: Flights) -> Iterator[Finding]:

@@ -1,7 +1,7 @@
 """Findings about how a motion was recorded: order of quaternions, frame of spins, missing and repeated frames, height of the floor."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import permutations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, SURPRISING, Flight, noise_of, surprise, window_size
 from dropspin.comparisons.logs.flights import Flights, highest
-from dropspin.comparisons.logs.header import UPRIGHT, Header
+from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
 from dropspin.comparisons.logs.log import Cause, Finding, Log, Toss
 from dropspin.comparisons.logs.noise import Noise
 from dropspin.comparisons.logs.rest import level_share, rests
@@ -18,7 +18,7 @@ from dropspin.comparisons.running.foreign_motions import missing_frames
 from dropspin.scenarios.bodies import Body, Box, Ellipsoid
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.rotations import conjugate, cross, length, multiply, rotate, unrotate
-from dropspin.scenarios.state import Array
+from dropspin.scenarios.state import UP, Array
 
 EXPLAINED = 0.4
 """Share of the difference from the rotation of a free body that another reading of the orientations leaves at most."""
@@ -91,6 +91,35 @@ def _readings(header: Header) -> Iterator[tuple[Cause, int, bool]]:
     yield Cause("order of the quaternions", keys=order), rolled, False
     yield Cause("direction of the quaternions", keys=direction), 0, True
     yield Cause("order and direction of the quaternions", keys=order | direction), rolled, True
+
+
+def in_other_readings(log: Log) -> Iterator[tuple[Finding, Log]]:
+    """The recording in each other unit, and with each other reading of its quaternions, and the finding that this one is right.
+
+    With a wrong unit or orientation, the point that the header says to be tracked does not fly, unless it is the centre of mass.
+    """
+    header, floor = log.header, log.header.floor_height * UP
+
+    def of(cause: Cause, change: Callable[[Toss], Toss]) -> Log:
+        return replace(log, header=header.model_copy(update=dict(cause.keys)), tosses=tuple(map(change, log.tosses)))
+
+    for key, units, power in (("length_unit", LENGTHS, 1), ("time_unit", TIMES, -2)):
+        now = getattr(header, key)
+        for unit in units if header.rate is None or key == "length_unit" else ():
+            cause, factor = Cause(key.replace("_", " "), keys={key: unit}), units[unit] / units[now]
+            lengths, times = (factor, 1.0) if power == 1 else (1.0, factor)
+
+            def in_unit(toss: Toss, lengths: float = lengths, times: float = times) -> Toss:
+                velocity = None if toss.velocity is None else toss.velocity * (lengths / times)
+                spin = None if toss.angular_velocity is None else toss.angular_velocity / times
+                position = lengths * (toss.position + floor) - floor
+                return replace(toss, t=times * toss.t, position=position, velocity=velocity, angular_velocity=spin)
+
+            if unit != now:
+                yield Finding("unit", header.gravity / factor**power, header.gravity, causes=(cause,)), of(cause, in_unit)
+    for cause, rolled, inverse in _readings(header):
+        read = of(cause, lambda toss, rolled=rolled, inverse=inverse: _read_as(toss, header, rolled, inverse))  # type: ignore[misc]
+        yield Finding("quaternion", level_share(log)[0], level_share(read)[0], causes=(cause,)), read
 
 
 def orders_of_axes(body: Body) -> Iterator[tuple[Array, Cause]]:

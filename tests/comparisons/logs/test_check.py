@@ -330,6 +330,23 @@ def test_each_error_of_recorded_rates_is_named_and_no_unit_that_does_not_explain
     assert causes(lambda spin: 10.0 * spin[:, [1, 2, 0]]) == [()]
 
 
+@pytest.mark.parametrize(
+    ("keys", "change"),
+    [
+        ({"length_unit": "mm"}, lambda toss: replace(toss, position=1e-3 * toss.position)),
+        ({"time_unit": "ms"}, lambda toss: replace(toss, t=1e-3 * toss.t)),
+        ({"quaternion": "wxyz"}, lambda toss: replace(toss, orientation=np.roll(toss.orientation, -1, axis=1))),
+    ],
+)
+def test_header_that_is_wrong_in_a_way_that_lets_no_point_fly_is_corrected(keys: dict[str, Any], change: Callable[[Toss], Toss]) -> None:
+    """Turned by wrong quaternions, or in a wrong unit, the point that is tracked beside the centre of mass is not where it was."""
+    point = (0.03, 0.02, -0.05)
+    log = made(1, 5, NOISE, offset=point, spin=10.0, header={"tracked_point": point}).log
+    header = log.header.model_copy(update={"rate": None})
+    wrong = replace(log, header=header.model_copy(update=keys), tosses=tuple(map(change, log.tosses)))
+    assert log_check(wrong).corrected == header
+
+
 def rates_of(flights: Flights, **changes: Callable[[Toss], Any]) -> Iterator[Finding]:
     """The findings of rates in flights of tosses of which other parts are changed."""
     log = changed(flights.log, **changes)

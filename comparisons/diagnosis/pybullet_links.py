@@ -106,7 +106,11 @@ class Link(NamedTuple):
             yield "inertial", Setting("no inertial", self.element.file, self.element.line), f"missing: the mass is {self.mass:g} kg"
         elif np.abs(written - self.inertia).max() > SAME * np.abs(written).max():
             times = " times <inertia_scaling>" if next(self.element.every("inertia_scaling"), None) else ""
-            is_ball = len(self.geometry) == 1 and next(self.element.every("sphere"), None) is not None
+            balls = [sizes[0] for _, _, kind, sizes, *_ in self.geometry if kind == server().GEOM_SPHERE]
+            # Of a ball that is turned or displaced, PyBullet takes the box that bounds it.
+            is_ball = len(self.geometry) == 1 and any(
+                bool(times) or math.isclose(self.dynamics[2][0], 0.4 * self.mass * r**2, rel_tol=SAME) for r in balls
+            )
             of = "the sphere" if is_ball else "the bounding box of the collision geometry"
             made = f"replaced by that of {of}{times}: {digits(self.dynamics[2])} kg m²"
             yield "inertia", next(self.element.every("inertia")).words, made

@@ -251,6 +251,16 @@ def test_moments_of_a_sphere_are_named_with_the_factor_that_the_file_has(tmp_pat
     assert made == "replaced by that of the sphere times <inertia_scaling>: 0.3, 0.3, 0.3 kg m²"
 
 
+@pytest.mark.parametrize(
+    ("on", "made"), [("", "the sphere: 0.1"), ('<origin rpy="0 0 .5"/>', "the bounding box of the collision geometry: ")]
+)
+def test_what_replaces_the_inertia_of_a_ball_is_named(tmp_path, on, made):
+    """Of a ball that is turned, PyBullet takes the inertia of the box that bounds it."""
+    ball = body(tmp_path, link(BALL, moments=(0.2, 0.2, 0.2), on=on))
+    [found] = [found for name, _, found in ball.facts.ignored if name == "inertia"]
+    assert found.startswith(f"replaced by that of {made}")
+
+
 def test_a_ball_rolls_and_has_no_row_of_slides(tmp_path):
     ball = body(tmp_path, link(BALL))
     assert slide(ball, DTS) == []

@@ -21,12 +21,10 @@ from dropspin.comparisons.logs.log import Cause, Finding, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
 from dropspin.comparisons.logs.recording_faults import in_other_readings, of_floor, of_frames, of_quaternions, of_rates, orders_of_axes
 from dropspin.comparisons.logs.rest import rests
-from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import unrotate
 from dropspin.scenarios.state import UP, Array
-from dropspin.scenarios.validation import validated
 
 ALARM = 1e-4
 """Probability of a finding where there is nothing, of each value."""
@@ -87,12 +85,8 @@ class Check:
     @property
     def corrected(self) -> Header:
         """The header, corrected by the keys of each finding that has a single cause."""
-        content = self.flights.log.header.model_dump()
-        for finding in self.findings:
-            if len(finding.causes) == 1:
-                for key, value in finding.causes[0].keys.items():
-                    (content["body"] if key.startswith("body.") else content)[key.removeprefix("body.")] = value
-        return validated(Header, "corrected header", content)
+        keys = [finding.causes[0].keys for finding in self.findings if len(finding.causes) == 1]
+        return self.flights.log.header.corrected({key: value for of_one in keys for key, value in of_one.items()})
 
     @property
     def reads_the_columns_right(self) -> bool:
@@ -214,7 +208,8 @@ def _of_offset(flights: Flights, values: Sequence[Value]) -> Iterator[Finding]:
     """Of a centre of mass that is not where the header says, along the axes along which it is identifiable."""
     header, found = flights.log.header, flights.moving
     off = np.where(_known(values, CENTRES), header.tracked_from_centre - found.values[OFFSET], 0.0)
-    is_off = np.abs(off) > found.half_widths(ALARM)[OFFSET]
+    by_scale = abs(found.values[1] / header.gravity + 1.0) * float(np.linalg.norm(header.tracked_from_centre))
+    is_off = np.abs(off) > found.half_widths(ALARM)[OFFSET] + by_scale
     if is_off.any():
         _, _, moved, error = rests(flights.log).scale()
         seen, allowed = np.isfinite(moved) & is_off, 4.0 * error + 0.2 * np.abs(off)
@@ -245,7 +240,7 @@ def _of_inertia(flights: Flights, drag: Regression, values: Sequence[Value]) -> 
     stretched = np.exp(0.5 * np.array([ratios[0], 0.0, ratios[1]]))
     keys = {"body.inertia": _moments(body.inertia_tensor * np.outer(stretched, stretched))}
     wide = found.half_widths(ALARM)
-    orders = tuple(_orders_that_fit(body, ratios, np.where(known, wide, np.inf)))
+    orders = tuple(_orders_that_fit(flights.log, ratios, np.where(known, wide, np.inf)))
     causes = (*orders, Cause("other moments" if orders else "moments of inertia", keys=keys))
     for kind, value, error in zip(("inertia, x", "inertia, z"), ratios, wide, strict=True):
         if abs(value) > max(error, 0.01):
@@ -254,10 +249,10 @@ def _of_inertia(flights: Flights, drag: Regression, values: Sequence[Value]) -> 
         yield Finding("drag", float(drag.values[-1]), 0.0)
 
 
-def _orders_that_fit(body: Body, ratios: Array, wide: Array) -> Iterator[Cause]:
+def _orders_that_fit(log: Log, ratios: Array, wide: Array) -> Iterator[Cause]:
     """The orders of the body's axes with which the ratios of its moments are as measured: logarithms over the header's, shape (2,)."""
-    own = np.diag(body.inertia_tensor)
-    for inertia, cause in orders_of_axes(body):
+    own = np.diag(log.header.body.inertia_tensor)
+    for inertia, cause in orders_of_axes(log):
         changes = np.log(np.diag(inertia) / own)
         if (np.abs(changes[[0, 2]] - changes[1] - ratios) <= wide).all():
             yield cause

@@ -1,6 +1,7 @@
 """The header of a recording, a TOML file: units, axes, conventions, the body and the floor."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -11,6 +12,7 @@ from dropspin.scenarios.state import Array
 from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.tables import Number, Positive, Table, Vector
 from dropspin.scenarios.text import Text
+from dropspin.scenarios.validation import validated
 
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "foot": 0.3048}
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -70,3 +72,10 @@ class Header(Table):
     def tracked_from_centre(self) -> Array:
         """The tracked point from the centre of mass, in the body frame [m], shape (3,)."""
         return np.asarray(self.tracked_point, dtype=np.float64) - self.body.centre
+
+    def corrected(self, keys: Mapping[str, Any]) -> "Header":
+        """The header with other values of keys; those of the body begin with `body.`."""
+        content = self.model_dump()
+        for key, value in keys.items():
+            (content["body"] if key.startswith("body.") else content)[key.removeprefix("body.")] = value
+        return validated(Header, "corrected header", content)

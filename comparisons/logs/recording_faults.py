@@ -15,7 +15,7 @@ from dropspin.comparisons.logs.noise import Noise
 from dropspin.comparisons.logs.rest import level_share, rests
 from dropspin.comparisons.logs.rotors import rotation
 from dropspin.comparisons.running.foreign_motions import missing_frames
-from dropspin.scenarios.bodies import Body, Box, Ellipsoid
+from dropspin.scenarios.bodies import Box, Ellipsoid
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.rotations import conjugate, cross, length, multiply, rotate, unrotate
 from dropspin.scenarios.state import UP, Array
@@ -38,6 +38,11 @@ RESTS_NEAR = 0.04
 """Of the size of the body: how far above or below the floor it may rest, by errors of its own size and of tags."""
 DEGREE, BETTER = 5, 1.02
 """Degree of the polynomials that compare times with equal steps. Uneven times are right unless equal steps fit by this factor better."""
+
+ORDERS = ("body axes", "order of the moments")
+"""Causes: all of the body's axes are in another order, or its moments of inertia alone."""
+CLEARLY = 3.0
+"""Ratio of the scatter of heights at rest with two orders of the lengths from which on the smaller one is the right one."""
 
 
 def _read_as(toss: Toss, header: Header, rolled: int, inverse: bool) -> Toss:
@@ -66,7 +71,7 @@ def of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
     can_be_explained = bool(tried) and EXPLAINED * turns > LEAST_LEFT * flights.turning.noise.white
     orders = [
         (_restlessness([rotation(flight, exchanged).samples.values for flight in tried]), level, cause)
-        for exchanged, cause in (orders_of_axes(log.header.body) if can_be_explained else ())
+        for exchanged, cause in (orders_of_axes(log) if can_be_explained else ())
     ]
     found = [one for one in (*readings, *orders) if one[0] < EXPLAINED * turns and not one[1] < NEARLY * level]
     if not found and count >= 3 and level < 0.7:
@@ -76,7 +81,7 @@ def of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
         best = [one for one in found if one[0] <= EQUALLY * least]
         left, share, _ = max(best, key=lambda one: one[1])
         causes = [cause for _, of_reading, cause in best if not of_reading < NEARLY * share]
-        are_read = any(cause.name != "body axes" for cause in causes)
+        are_read = any(cause.name not in ORDERS for cause in causes)
         kind, value, expected = ("quaternion", level, share) if are_read else ("body axes", turns, left)
         yield Finding(kind, value, expected, causes=tuple(cause for number, cause in enumerate(causes) if cause not in causes[:number]))
     elif flights.turning.noise.white > UNTRACKED:
@@ -122,18 +127,27 @@ def in_other_readings(log: Log) -> Iterator[tuple[Finding, Log]]:
         yield Finding("quaternion", level_share(log)[0], level_share(read)[0], causes=(cause,)), read
 
 
-def orders_of_axes(body: Body) -> Iterator[tuple[Array, Cause]]:
-    """The inertia of the body with its axes in each other order [kg m²], shape (3, 3), and the cause with that order."""
-    inertia = body.inertia_tensor
+def orders_of_axes(log: Log) -> Iterator[tuple[Array, Cause]]:
+    """The inertia of the body with its axes in each other order [kg m²], shape (3, 3), and the causes with that order.
+
+    The moments alone may be in another order, if the header has them. The heights at rest show whether the lengths are.
+    """
+    body, inertia = log.header.body, log.header.body.inertia_tensor
     if not is_diagonal(inertia):
         return
+    _, scatter = rests(log).above()
     vectors = {"half_extents": body.half_extents, "center_of_mass": body.center_of_mass} if isinstance(body, Box | Ellipsoid) else {}
     vectors |= {"inertia": body.moments} if vectors and isinstance(body.inertia, tuple) else {}
     for axes in permutations(range(3)):
         exchanged = inertia[np.ix_(axes, axes)]
         if not np.array_equal(exchanged, inertia):
             keys = {f"body.{name}": [vector[axis] for axis in axes] for name, vector in vectors.items() if vector and any(vector)}
-            yield exchanged, Cause("body axes", keys=keys)
+            moments = {name: values for name, values in keys.items() if name == "body.inertia"}
+            _, other = rests(replace(log, header=log.header.corrected(keys))).above()
+            if not other > CLEARLY * scatter:
+                yield exchanged, Cause(ORDERS[0], keys=keys)
+            if moments and not scatter > CLEARLY * other:
+                yield exchanged, Cause(ORDERS[1], keys=moments)
 
 
 def _restlessness(left: list[Array]) -> float:

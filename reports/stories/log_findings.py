@@ -47,6 +47,7 @@ CAUSES = {
     "axes": "the axes are tilted",
     "push": "a horizontal force acts on the body",
     "body axes": "its axes are in another order",
+    "order of the moments": "its moments of inertia are in another order",
     "other moments": "its moments of inertia are not those in the header",
     "spin frame": "it is in the {key} frame",
     "degrees": "it is in degrees per second",

@@ -144,6 +144,13 @@ def test_edges_in_another_order_are_named_by_the_motion_of_a_brick() -> None:
     assert check.corrected == log.header
 
 
+def test_wrong_scale_of_lengths_moves_no_tracked_point() -> None:
+    """Recorded 2 % short, 62 mm between the tracked point and the centre of mass are 61."""
+    point = (0.03, 0.02, -0.05)
+    log = made(1, 5, (2e-5, 2e-4), offset=point, spin=10.0, header={"tracked_point": point}).log
+    assert [finding.kind for finding in log_check(changed(log, position=lambda toss: 0.98 * toss.position)).findings] == ["scale"]
+
+
 @pytest.mark.extended
 def test_two_edges_that_are_exchanged_and_other_moments_are_alternatives() -> None:
     body = {"shape": "box", "half_extents": [0.04, 0.05, 0.07], "mass": 0.4}

@@ -9,7 +9,7 @@ from support.tosses import BRICK, made
 from dropspin.comparisons.logs.flights import flights_of
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.log import Log, Toss
-from dropspin.comparisons.logs.recording_faults import of_floor
+from dropspin.comparisons.logs.recording_faults import of_floor, orders_of_axes
 from dropspin.comparisons.logs.rest import Rests, level_share, rests
 from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import Array
@@ -45,6 +45,14 @@ def test_scale_and_tracked_point_are_exact(floor: float) -> None:
     scale, _, found, _ = rests(resting(0.98, error, floor=floor)).scale()
     assert scale == pytest.approx(0.98, abs=1e-12)
     np.testing.assert_allclose(found, 0.98 * error, atol=1e-12)
+
+
+def test_heights_at_rest_tell_edges_in_another_order_from_moments() -> None:
+    log = resting(1.0, np.array([1e-4, 2e-4, -1e-4]))
+    assert {cause.name for _, cause in orders_of_axes(log)} == {"order of the moments"}
+    wrong = replace(log, header=log.header.corrected({"body.half_extents": [0.07, 0.04, 0.05], "body.inertia": [5.5e-4, 9.9e-4, 8.7e-4]}))
+    right = [cause for inertia, cause in orders_of_axes(wrong) if np.array_equal(inertia, log.header.body.inertia_tensor)]
+    assert [(cause.name, cause.keys["body.half_extents"]) for cause in right] == [("body axes", [0.04, 0.05, 0.07])]
 
 
 def test_a_record_that_is_not_quite_level_does_not_change_the_scale() -> None:

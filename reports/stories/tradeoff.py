@@ -131,10 +131,11 @@ def sentences(study: TradeOff, within: Sequence[float]) -> list[str]:
 
 
 def _undefined(study: TradeOff) -> list[str]:
-    """Sentences on the engines that are compared and diverge, or have no error, at some of their time steps."""
+    """Sentences on the engines that are compared and diverge, or have no error, at time steps below one at which they have an error."""
     causes: dict[str, list[str]] = {}
     for ladder in study.ladders:
-        without = [dt for dt, error in ladder.completed if not math.isfinite(error)]
+        coarsest = max((dt for dt, error in ladder.completed if math.isfinite(error)), default=0.0)
+        without = [dt for dt, error in ladder.completed if not math.isfinite(error) and dt < coarsest]
         if without and not ladder.left_out:
             steps = f"{len(without)} of {counted(len(ladder.completed), 'time step', 'time steps')}, down to {in_ms(without[-1])}"
             causes.setdefault(f"No error at {steps}, because {ladder.undefined}", []).append(ladder.engine)

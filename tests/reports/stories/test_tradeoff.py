@@ -75,6 +75,12 @@ def test_ladders_are_listed_with_their_ends_and_reasons(found):
     assert tradeoff.sentences(found, [])[4:] == ["Left out: other, no convergence observed.", "Left out: missing, not installed."]
 
 
+def test_time_step_that_is_too_coarse_for_an_error_is_not_listed(found):
+    coarse = Ladder("accurate", ((0.066, np.nan), *found.ladders[2].steps), "longest_run", "a run would be too long", undefined="x")
+    study = TradeOff(found.scene, found.metric, found.points, (*found.ladders[:2], coarse))
+    assert [sentence for sentence in tradeoff.sentences(study, []) if sentence.startswith("No error") and "accurate" in sentence] == []
+
+
 def test_only_engine_within_a_tolerance_is_compared_with_tested_ones(found):
     assert "; no other engine that was compared reaches this tolerance." in tradeoff.sentences(found, [4.5e-3])[0]
     alone = TradeOff(found.scene, found.metric, found.points[-2:], found.ladders[2:3])

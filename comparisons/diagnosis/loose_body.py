@@ -153,7 +153,7 @@ class Facts:
             return float(fall(time, self.gravity * (1.0 - self.lifted), self.mass, self.armature, *self.falls[:2])[0])
         return float(-self.in_force(self.start(), np.array([0.0, time]), self.gravity)[-1, 1] + self.start()[1])
 
-    def keeps_axis(self, axis: int) -> bool:
+    def _keeps_axis(self, axis: int) -> bool:
         """Whether damping slows a spin about a principal axis without turning it away: with several links its torque is another one."""
         spin = self.principal[1][:, axis]
         _, torque = self.resistance(STILL, spin)
@@ -162,7 +162,7 @@ class Facts:
     def spun(self, axis: int, speed: float, time: float) -> float:
         """The exact speed of a spin about a principal axis with the settings in force [rad/s], after a time [s]."""
         moments, axes = self.principal
-        if self.keeps_axis(axis) and not self.spins[axis].cubic:
+        if self._keeps_axis(axis) and not self.spins[axis].cubic:
             return float(spin_about_axis(time, speed, moments[axis], self.armature, *self.spins[axis][:2]))
         start = self.start(spin=speed * axes[:, axis])
         return float(np.linalg.norm(self.in_force(start, np.array([0.0, time]), 0.0)[-1, SPIN]))
@@ -171,7 +171,7 @@ class Facts:
         """The exact time after which a spin about a principal axis is 1/e of its start [s]; infinite if the settings do not slow it."""
         moments, axes = self.principal
         tau = time_constant(speed, moments[axis], self.armature, *self.spins[axis])
-        if self.keeps_axis(axis) or math.isinf(tau):
+        if self._keeps_axis(axis) or math.isinf(tau):
             return tau
         times = np.linspace(0.0, 4.0 * tau, 4001)
         return time_of_decay(times, np.linalg.norm(self.in_force(self.start(spin=speed * axes[:, axis]), times, 0.0)[:, SPIN], axis=1))

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.logs.falling import flights_in_any_units
-from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, Flight, falls, positions
-from dropspin.comparisons.logs.flights import Flights
+from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, falls, positions
+from dropspin.comparisons.logs.flights import Flights, flights_of
 from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
 from dropspin.comparisons.logs.log import Cause, Finding, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
@@ -111,11 +111,11 @@ def log_check(recording: Flights | Log | str | Path) -> Check:
         try:
             flights = flights_in_any_units(log, ALARM)
         except DropspinError:
-            reading, read = max(in_other_readings(log), key=lambda one: sum(map(len, _falls_in(one[1]))))
-            if 2 * len(_falls_in(read)) < len(log.tosses):
+            other = _in_another_reading(log)
+            if other is None:
                 raise
-            check = log_check(read)
-            return replace(check, findings=(reading, *check.findings))
+            check = log_check(other[1])
+            return replace(check, findings=(other[0], *check.findings))
     else:
         flights = log
     drag = regression([positions(flight, with_drag=True) for flight in flights.found])
@@ -132,9 +132,12 @@ def log_check(recording: Flights | Log | str | Path) -> Check:
     return replace(check, findings=tuple(found))
 
 
-def _falls_in(log: Log) -> list[Flight]:
-    """The falls of the tosses with the header's gravity."""
-    return [fall for fall in falls(log, np.array([0.0, -log.header.gravity, 0.0])) if fall is not None]
+def _in_another_reading(log: Log) -> tuple[Finding, Flights] | None:
+    """The other reading in which the tosses fall longest, and its flights; None if less than half of the tosses fall in it."""
+    readings = [(finding, read, falls(read, read.header.acceleration)) for finding, read in in_other_readings(log)]
+    finding, read, fallen = max(readings, key=lambda reading: sum(map(len, filter(None, reading[2]))))
+    flights = flights_of(read, read.header.acceleration) if 2 * fallen.count(None) <= len(fallen) else None
+    return None if flights is None else (finding, flights)
 
 
 def _of_units(flights: Flights) -> Iterator[Finding]:

@@ -114,7 +114,7 @@ def flights_in(recording: Flights | Log | str | Path) -> Flights:
     if isinstance(recording, Flights):
         return recording
     log = recording if isinstance(recording, Log) else load_log(recording)
-    found = flights_of(log, np.array([0.0, -log.header.gravity, 0.0]))
+    found = flights_of(log, log.header.acceleration)
     if found is None:
         raise DropspinError(f"{log.origin}: no toss has a flight with the acceleration of gravity; dropspin log check says why.")
     return found

@@ -27,7 +27,7 @@ def flights_in_any_units(log: Log, alarm: float) -> Flights:
     Raises:
         DropspinError: There is none.
     """
-    down = np.array([0.0, -log.header.gravity, 0.0])
+    down = log.header.acceleration
     acceleration = _acceleration(log, down)
     flights = flights_of(log, acceleration)
     if flights is None or (acceleration is not down and not _flies(flights, alarm)):

@@ -97,7 +97,7 @@ class Flights:
     def starts(self) -> list[Start]:
         """The state at the end of each flight, by the header's gravity and centre of mass."""
         header = self.log.header
-        known = np.concatenate([[0.0, -header.gravity, 0.0], header.tracked_from_centre])
+        known = np.concatenate([header.acceleration, header.tracked_from_centre])
         each = zip(self.found, self.rotations, self.moving.weights, self.turning.weights, strict=True)
         position, orientation = self.moving.noise, self.turning.noise
         return [

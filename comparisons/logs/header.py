@@ -73,6 +73,11 @@ class Header(Table):
         """The tracked point from the centre of mass, in the body frame [m], shape (3,)."""
         return np.asarray(self.tracked_point, dtype=np.float64) - self.body.centre
 
+    @property
+    def acceleration(self) -> Array:
+        """That of a free fall [m/s²], shape (3,)."""
+        return np.array([0.0, -self.gravity, 0.0])
+
     def corrected(self, keys: Mapping[str, Any]) -> "Header":
         """The header with other values of keys; those of the body begin with `body.`."""
         content = self.model_dump()

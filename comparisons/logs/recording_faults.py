@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import permutations
 
 import numpy as np
@@ -64,7 +65,7 @@ def of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
     tried = flights.found[:MOST_ROTORS] if not is_ball else []
     readings = []  # each with what it leaves of the difference from free bodies, and with the share of the tosses that end on a face
     for cause, rolled, inverse in _readings(log.header):
-        read = replace(log, tosses=tuple(_read_as(toss, log.header, rolled, inverse) for toss in log.tosses))
+        read = _corrected(log, cause, partial(_read_as, header=log.header, rolled=rolled, inverse=inverse))
         some = [replace(flight, toss=_read_as(flight.toss, log.header, rolled, inverse)) for flight in tried]
         left = _restlessness([rotation(flight, inertia).samples.values for flight in some]) if some else turns
         readings.append((left, level_share(read)[0], cause))
@@ -103,28 +104,31 @@ def in_other_readings(log: Log) -> Iterator[tuple[Finding, Log]]:
 
     With a wrong unit or orientation, the point that the header says to be tracked does not fly, unless it is the centre of mass.
     """
-    header, floor = log.header, log.header.floor_height * UP
-
-    def of(cause: Cause, change: Callable[[Toss], Toss]) -> Log:
-        return replace(log, header=header.model_copy(update=dict(cause.keys)), tosses=tuple(map(change, log.tosses)))
-
+    header = log.header
     for key, units, power in (("length_unit", LENGTHS, 1), ("time_unit", TIMES, -2)):
         now = getattr(header, key)
         for unit in units if header.rate is None or key == "length_unit" else ():
             cause, factor = Cause(key.replace("_", " "), keys={key: unit}), units[unit] / units[now]
             lengths, times = (factor, 1.0) if power == 1 else (1.0, factor)
-
-            def in_unit(toss: Toss, lengths: float = lengths, times: float = times) -> Toss:
-                velocity = None if toss.velocity is None else toss.velocity * (lengths / times)
-                spin = None if toss.angular_velocity is None else toss.angular_velocity / times
-                position = lengths * (toss.position + floor) - floor
-                return replace(toss, t=times * toss.t, position=position, velocity=velocity, angular_velocity=spin)
-
             if unit != now:
-                yield Finding("unit", header.gravity / factor**power, header.gravity, causes=(cause,)), of(cause, in_unit)
+                read = _corrected(log, cause, partial(_in_units, header=header, lengths=lengths, times=times))
+                yield Finding("unit", header.gravity / factor**power, header.gravity, causes=(cause,)), read
     for cause, rolled, inverse in _readings(header):
-        read = of(cause, lambda toss, rolled=rolled, inverse=inverse: _read_as(toss, header, rolled, inverse))  # type: ignore[misc]
+        read = _corrected(log, cause, partial(_read_as, header=header, rolled=rolled, inverse=inverse))
         yield Finding("quaternion", level_share(log)[0], level_share(read)[0], causes=(cause,)), read
+
+
+def _corrected(log: Log, cause: Cause, change: Callable[[Toss], Toss]) -> Log:
+    """The recording with the keys of a cause in its header, and with each toss changed alike."""
+    return replace(log, header=log.header.model_copy(update=dict(cause.keys)), tosses=tuple(map(change, log.tosses)))
+
+
+def _in_units(toss: Toss, header: Header, lengths: float, times: float) -> Toss:
+    """The toss with its lengths and times multiplied by factors; the height of the floor is a true length."""
+    floor = header.floor_height * UP
+    velocity = None if toss.velocity is None else toss.velocity * (lengths / times)
+    spin = None if toss.angular_velocity is None else toss.angular_velocity / times
+    return replace(toss, t=times * toss.t, position=lengths * (toss.position + floor) - floor, velocity=velocity, angular_velocity=spin)
 
 
 def orders_of_axes(log: Log) -> Iterator[tuple[Array, Cause]]:

@@ -11,7 +11,7 @@ _interrupts: list[int] = []
 def handle_interrupts() -> None:
     """Treat other interrupts like Ctrl-C from now on, so that unfinished files are removed; record them."""
     for number in INTERRUPTS:
-        if number in (signal.SIGINT, signal.SIGTERM) or signal.getsignal(number) is not signal.SIG_IGN:  # as it is under nohup
+        if number in (signal.SIGINT, signal.SIGTERM) or signal.getsignal(number) is not signal.SIG_IGN:  # which nohup sets for SIGHUP
             signal.signal(number, _interrupt)
     sys.unraisablehook = _report_unless_interrupted
 

@@ -112,7 +112,7 @@ def test_run_states_the_settings_that_explain_a_failure():
 
 
 def test_settings_are_stated_where_errors_fail_as_dt_falls_alone():
-    """As in a scene of one's own, which has no bound: that of energy is computed from the step alone."""
+    """A scene without `[[expect]]` has no bound on these errors at a time step."""
     scene = load("fall-spin").model_copy(update={"expect": (), "duration": 0.3})
     table = run(scene, ["pybullet[linear_damping=0.04]"], [4e-3, 2e-3, 1e-3]).table
     assert set(table[table["verdict"] == "failed"]["kind"]) == {"asymptotic_error"}

@@ -15,6 +15,7 @@ from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
 from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of
 from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ENUMERATIONS, OPTIONS, PLANE, MuJoCoFile
+from dropspin.comparisons.diagnosis.mujoco_ignored import ignored
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.engines.base import Diverged
@@ -192,7 +193,7 @@ class MuJoCoBody(LooseBody):
             rest_depth=self._rest_depth(),
             written=self._text.written,
             settings=self._text.settings,
-            ignored=list(self._text.ignored(self._properties, raised=raised, condim=0 if touching is None else int(touching["condim"]))),
+            ignored=list(ignored(self._text, self._properties, raised=raised, condim=0 if touching is None else int(touching["condim"]))),
             unmodelled=[*file.unmodelled(alone.head), *start, *tilted, *several, *[alone.left_out] * bool(alone.left_out)],
             missed=alone.missed if is_above and file.gravity.any() else "",
             left_out=alone.left_out,

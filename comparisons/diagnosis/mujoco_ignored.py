@@ -1,0 +1,137 @@
+"""What the file of a body says and MuJoCo changes or does not use."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, digits
+from dropspin.comparisons.diagnosis.loose_body import MassProperties
+from dropspin.comparisons.diagnosis.mujoco_elements import children_of
+from dropspin.comparisons.diagnosis.mujoco_file import BODY
+from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL
+from dropspin.comparisons.diagnosis.mujoco_text import BodyText, differ
+from dropspin.comparisons.diagnosis.source import Ignored, Setting, option_setting
+from dropspin.comparisons.diagnosis.urdf_file import used_by_neither_engine
+
+IN_FORCE = {"lateral_friction": 1.0, "rolling_friction": 0.0, "spinning_friction": 0.0, "restitution": 0.0}
+IN_FORCE |= {"inertia_scaling": 1.0} | dict.fromkeys(("stiffness", "damping", "friction_anchor"), math.nan)
+"""The settings of inertia and contact in a URDF file, which MuJoCo does not read, and what it has instead."""
+FURTHER = {"torsional": (1, 4, 0.005), "rolling": (2, 6, 1e-4)}
+"""The place of a coefficient of friction, the dimensions of contacts that have it, and its default."""
+PER_METRE = {"cm": 100.0, "mm": 1000.0}
+"""Units of length in which models are written by mistake."""
+
+
+def ignored(text: BodyText, in_force: MassProperties, *, raised: bool, condim: int) -> Iterator[Ignored]:
+    """What the file says and MuJoCo changes or does not use.
+
+    Args:
+        text: The body in the words of its file.
+        in_force: The mass and the inertia in force.
+        raised: Whether the time constant of a contact is raised.
+        condim: The dimensions of the contact with what the body lands on; 0 without one.
+    """
+    settings, written, gravity = text.settings, text.written, float(np.linalg.norm(text.file.gravity))
+    for unit, factor in PER_METRE.items():
+        if math.isclose(gravity, 9.81 * factor, rel_tol=NOTEWORTHY):
+            setting = option_setting(text.file.source, "option", "gravity", "")
+            yield "gravity", setting, f"taken as {gravity:g} m/s²; dropspin reads SI units, and this may be a model in {unit}"
+    if raised:
+        constant = 2.0 * text.model.opt.timestep
+        yield "solref", settings.get("solref", Setting("solref")), f"raised to a time constant of {constant:g} s, two time steps"
+    if written is not None:
+        wanted, has = np.linalg.eigvalsh(written.inertia), np.linalg.eigvalsh(in_force.inertia)
+        if differ(written.mass, in_force.mass):
+            yield _changed(text, "mass", f"changed: {in_force.mass:.4g} kg")
+        if differ(wanted, has):
+            made = f"refused ({text.file.refusal}); measured with balanceinertia" if text.file.refusal else "changed"
+            made = made if wanted.any() else "0, with which MuJoCo simulates no body; measured with that of a uniform solid"
+            yield _changed(text, "inertia", f"{made}: moments {digits(has.tolist())} kg m²")
+    yield from _miscounted(text)
+    yield from _visual(text)
+    if condim == 1 and "friction" in settings:
+        yield "friction", settings["friction"], "not used: condim is 1"
+    elif condim and (
+        unused := [name for name, (place, least, most) in FURTHER.items() if condim < least and _friction(text, place) > most]
+    ):
+        needed = " and ".join(f"{name} friction needs condim {FURTHER[name][1]}" for name in unused)
+        yield "friction", settings["friction"], f"used in part: {needed}, and condim is {condim}"
+    if text.file.is_urdf:
+        element = text.element
+        if text.model.body_weldid[text.head] == 0:
+            yield "base", Setting("the root link") if element is None else element.words, "welded to the world"
+        yield from _of_links(text)
+
+
+def _friction(text: BodyText, place: int) -> float:
+    """A coefficient of friction that the file has; 0 if it has none in this place."""
+    written = text.settings.get("friction")
+    numbers = written.text.partition('"')[2].strip('"').split() if written else []
+    place += len(numbers) == 5  # the coefficients of a pair, two of them sliding
+    return float(numbers[place]) if len(numbers) > place else 0.0
+
+
+def _miscounted(text: BodyText) -> Iterator[Ignored]:
+    """A mass that is not that of the volumes of the body's meshes."""
+    has, exact = text.properties(text.file.compiled), text.properties(text.file.recompiled.exact)
+    if has is not None and exact is not None and abs(has.mass - exact.mass) > NOTEWORTHY * exact.mass:
+        used = {
+            mujoco.mj_id2name(text.model, mujoco.mjtObj.mjOBJ_MESH, text.model.geom_dataid[geom])
+            for geom in np.flatnonzero(np.isin(text.model.geom_bodyid, text.group))
+            if text.model.geom_dataid[geom] >= 0
+        }
+        every = list(text.file.source.every("mesh"))
+        meshes = [mesh for mesh in every if mesh.attributes.get("name", Path(mesh.attributes.get("file", "")).stem) in used]
+        made = f'counted as {has.mass:.4g} kg by default; its volume has {exact.mass:.4g} kg, which inertia="exact" gives'
+        yield "mesh", meshes[0].words if meshes else Setting("a mesh"), made
+
+
+def _of_links(text: BodyText) -> Iterator[Ignored]:
+    """Of the links in a URDF file: a mass that follows from the geometries, and settings of contacts."""
+    links = {link.attributes.get("name", ""): link for link in text.file.source.every("link")}
+    for number in text.group:
+        if (link := links.get(name := mujoco.mj_id2name(text.model, BODY, number))) is None:
+            continue
+        if (mass := text.model.body_mass[number]) > 0.0 and next(link.every("inertial"), None) is None:
+            words = Setting(f"no inertial in link {name}", link.file, link.line)
+            yield "inertial", words, f"missing: the mass is {mass:.4g} kg, that of the geometries at the default density"
+        unread = [found for tag, value in IN_FORCE.items() for found in link.every(tag) if found.number("value", value) != value]
+        for found in (*unread, *used_by_neither_engine(link)):
+            yield found.tag + ("" if number == text.head else f" of {name}"), found.words, "not read"
+
+
+def _visual(text: BodyText) -> Iterator[Ignored]:
+    """Geometries that collide with nothing, and count in the mass by their density."""
+    has, least = text.properties(text.file.compiled), text.properties(text.file.recompiled.without_visual)
+    if text.element is None or has is None or least is None or not has.mass - least.mass > NOTEWORTHY * has.mass:
+        return
+    model, elements = text.model, children_of(text.element, "geom")
+    geoms = np.flatnonzero(model.geom_bodyid == text.head)
+    pairs = zip(geoms, elements, strict=True) if len(geoms) == len(elements) else ()
+    visual = [element for geom, element in pairs if not (model.geom_contype[geom] or model.geom_conaffinity[geom])]
+    words = visual[0].words if visual else Setting("geometries that collide with nothing")
+    yield "visual", words, f"counted in the mass with {has.mass - least.mass:.4g} kg, by density, although it collides with nothing"
+
+
+def _changed(text: BodyText, name: str, made: str) -> Ignored:
+    """A quantity that the compiler changes, with what is written, and the settings that do so, that of the largest effect first."""
+    found = {setting: option_setting(text.file.source, "compiler", setting, "") for setting in (*NEUTRAL, "balanceinertia")}
+    effects = {setting: _effect(text, setting, name) for setting, words in found.items() if words.file}
+    why = [found[setting] for setting in sorted(effects, key=effects.__getitem__, reverse=True) if effects[setting]]
+    first = [one for one in [text.settings.get(name)] if one] or why[:1] or [Setting(name)]
+    others = [str(one) for one in why if one not in first]
+    return name, first[0], made + (f", by {', '.join(others)}" if others else "")
+
+
+def _effect(text: BodyText, setting: str, name: str) -> float:
+    """By how much a setting of the compiler alone changes a quantity, in its unit; 0 for rounding."""
+    if setting == "balanceinertia":
+        without, has = text.written, text.unchanged
+    else:
+        without, has = (text.properties(one) for one in (text.file.recompiled.without(setting), text.file.compiled))
+    if without is None or has is None or not differ(getattr(without, name), getattr(has, name)):
+        return 0.0
+    return float(np.abs(np.subtract(getattr(without, name), getattr(has, name))).max())

@@ -45,9 +45,17 @@ class Start:
     state: Array
     covariance: Array
 
+    @cached_property
+    def deviations(self) -> Array:
+        """Independent steps of one standard deviation each, shape (12, 12): rows whose outer products add up to the covariance.
+
+        By Cholesky, which rounding does not change: the eigenvectors of equal eigenvalues, as of white noise, are arbitrary.
+        """
+        return np.asarray(np.linalg.cholesky(self.covariance).T, dtype=float)
+
     def drawn(self, random: np.random.Generator, count: int) -> Array:
         """States from its distribution, shape (count, 13)."""
-        return self.moved(random.multivariate_normal(np.zeros(12), self.covariance, count, method="eigh"))
+        return self.moved(random.standard_normal((count, 12)) @ self.deviations)
 
     def moved(self, steps: Array) -> Array:
         """States that differ from its own by steps in the order of the covariance, shape (count, 12): (count, 13)."""

@@ -87,10 +87,7 @@ def problem_of(flights: Flights, frames: int, steps: int) -> Problem:
     header, starts = flights.log.header, usable(flights, frames)
     scene, dt = scene_of(header), time_step(starts, steps)
     launched = launches(scene, starts, np.array([start.state for start in starts]), dt, frames)
-    deviations = [np.linalg.eigh(start.covariance) for start in starts]
-    moved = np.concatenate(
-        [start.moved((vectors * np.sqrt(np.maximum(values, 0.0))).T) for start, (values, vectors) in zip(starts, deviations, strict=True)]
-    )
+    moved = np.concatenate([start.moved(start.deviations) for start in starts])
     perturbed = launches(scene, [start for start in starts for _ in range(12)], moved, dt, frames)
     noise = np.repeat([flights.moving.noise.white, header.body.size * flights.turning.noise.white], 3)
     return Problem(scene, dt, recorded(starts, frames)[:, 1:], launched, perturbed, header, np.tile(noise**2, frames))

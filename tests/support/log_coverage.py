@@ -25,7 +25,7 @@ def outcome(count, number):
     random = np.random.default_rng([SEED, count, number])
     truth = {"friction": random.uniform(*FRICTION), "restitution": random.uniform(*RESTITUTION)}
     with engines_in_process():
-        fit = log_fit(tosses(random, count, WANG, **truth, dt=FINE), [WANG, OTHER], jobs=1)
+        fit = log_fit(tosses(random, count, WANG, **truth, dt=FINE / 8), [WANG, OTHER], jobs=1)
     of_each = {(one.parameter, one.engine): one for one in fit.estimates}
     asked = [of_each["friction", WANG], of_each["restitution", WANG], of_each["friction", OTHER], fit.friction]
     verdicts = [one.verdict for one in fit.transfers if one.parameter == "restitution"]

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import log_fits
 from support.tosses import BRICK, CUBE, made
 
 from dropspin.comparisons.logs.flight import LONGEST, SURPRISING, Flight, falls, noise_of, surprise
-from dropspin.comparisons.logs.flights import Flights, flights_of
+from dropspin.comparisons.logs.flights import Flights, Start, flights_of
 from dropspin.comparisons.logs.log import Log, Toss
 from dropspin.comparisons.logs.noise import Noise
 from dropspin.scenarios.rotations import rotation_vector
@@ -112,6 +113,20 @@ def test_ratios_of_inertia_are_those_of_the_motion_however_wrong_the_header_is()
     turning = found(wrong).turning
     np.testing.assert_array_less(np.abs(turning.values - np.log(1.3)), turning.half_widths())
     assert (turning.half_widths() < 0.005).all()
+
+
+def test_states_are_drawn_from_the_covariance_and_rounding_of_it_changes_none() -> None:
+    """White noise is the same along all axes, so that its covariance has triple eigenvalues, with arbitrary eigenvectors."""
+    random = np.random.default_rng(5)
+    start = log_fits.tosses(random, 1, log_fits.WANG, 0.3, 0.3).starts()[0]
+    assert isinstance(start, Start)
+    np.testing.assert_allclose(start.deviations.T @ start.deviations, start.covariance, rtol=0.0, atol=1e-12 * start.covariance.max())
+    rounding = 1e-15 * random.normal(size=(12, 12)) * start.covariance
+    other = replace(start, covariance=start.covariance + rounding + rounding.T)
+    one, two = (each.drawn(np.random.default_rng(6), 4000) for each in (start, other))
+    np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-12)
+    uncertainty = np.sqrt(np.diag(start.covariance))[[0, 1, 2, 6, 7, 8, 9, 10, 11]]
+    np.testing.assert_allclose(one[:, [0, 1, 2, 7, 8, 9, 10, 11, 12]].std(axis=0), uncertainty, rtol=0.05)
 
 
 def test_a_toss_that_errs_much_more_than_the_others_does_not_move_the_result() -> None:

@@ -19,7 +19,8 @@ from dropspin.comparisons.logs.flights import Flights, flights_of
 from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
 from dropspin.comparisons.logs.log import Cause, Finding, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
-from dropspin.comparisons.logs.recording_faults import in_other_readings, of_floor, of_frames, of_quaternions, of_rates, orders_of_axes
+from dropspin.comparisons.logs.other_readings import in_other_readings, of_lengths, of_quaternions, orders_of_axes
+from dropspin.comparisons.logs.recording_faults import of_floor, of_frames, of_rates
 from dropspin.comparisons.logs.rest import rests
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.errors import DropspinError
@@ -90,8 +91,8 @@ class Check:
 
     @property
     def reads_the_columns_right(self) -> bool:
-        """Whether the header states units, axes, quaternions and the floor correctly; an error of the scale is ignored."""
-        return not any(finding.kind in ("up", "unit", "quaternion", "body axes", "floor", "below") for finding in self.findings)
+        """Whether the header states units, axes, their order, quaternions and the floor correctly; an error of the scale is ignored."""
+        return not any(finding.kind in ("up", "unit", "quaternion", "body axes", "lengths", "floor", "below") for finding in self.findings)
 
 
 def log_check(recording: Flights | Log | str | Path) -> Check:
@@ -122,6 +123,8 @@ def log_check(recording: Flights | Log | str | Path) -> Check:
     found = [*_of_units(flights), *of_quaternions(flights.log, flights), *of_rates(flights), *of_frames(flights)]
     values = tuple(_values(flights, drag))
     check = Check(values, tuple(found), tuple(_tosses(flights)), flights)
+    if check.reads_the_columns_right:
+        check = replace(check, findings=(*found, *of_lengths(flights.log)))
     if not check.reads_the_columns_right:
         return check
     off = list(_of_offset(flights, values))

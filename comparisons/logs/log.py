@@ -84,8 +84,8 @@ class Finding:
         toss: The name of the toss; empty for the whole recording.
         frame: The frame of the toss, counted from 0.
         causes: The possible causes; if there are several, the recording does not distinguish them.
-        rests: Evidence from bodies at rest: the ratio of their heights to the expected ones, or the difference of the heights on opposite
-            faces [m].
+        rests: Evidence from bodies at rest: the ratio of their heights to the expected ones, the difference of the heights on opposite
+            faces [m], or their scatter with the remedy [m].
     """
 
     kind: str

@@ -6,6 +6,7 @@ s is the scale of the recorded lengths, h the height of the floor, r_k the verti
 the error of p.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -53,12 +54,16 @@ class Rests(NamedTuple):
         errors[seen] = np.sqrt(float(left @ left) / (len(left) - len(seen)) * np.diag(np.linalg.inv(columns.T @ columns)))
         return float(values[0]), float(errors[0]), values[1:], errors[1:]
 
+    @property
+    def scatter(self) -> float:
+        """The standard deviation of the heights from the expected ones [m]; NaN with fewer than `FEWEST_RESTS`."""
+        above = self.heights - self.expected
+        return float(np.std(above, ddof=1)) if len(above) >= FEWEST_RESTS else np.nan
+
     def above(self) -> tuple[float, float]:
         """The median height of the lowest points above the floor [m], and its standard error; NaN with fewer than `FEWEST_RESTS`."""
         above = self.heights - self.expected
-        if len(above) < FEWEST_RESTS:
-            return np.nan, np.nan
-        return float(np.median(above)), float(np.std(above, ddof=1) / np.sqrt(len(above)))
+        return (float(np.median(above)), self.scatter / math.sqrt(len(above))) if len(above) >= FEWEST_RESTS else (np.nan, np.nan)
 
 
 def rests(log: Log) -> Rests:

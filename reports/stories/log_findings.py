@@ -18,6 +18,7 @@ KINDS = {
     "drag": "the speed decays at a rate of {value:.2g} 1/s",
     "quaternion": "the body does not turn, or rest, as that of the header does",
     "body axes": "the body does not turn as that of the header does",
+    "lengths": "heights at rest differ by {mm:.2g} mm from those of the header's lengths, less their mean difference",
     "rotation": "the orientations differ by {value:.1f} rad from those of a free body",
     "spin": "the recorded angular velocity differs by {percent:.0f} % from that of the quaternions",
     "velocity": "the recorded velocity differs by {percent:.0f} % from that of the positions",
@@ -49,6 +50,7 @@ CAUSES = {
     "body axes": "its axes are in another order",
     "order of the moments": "its moments of inertia are in another order",
     "other moments": "its moments of inertia are not those in the header",
+    "order of the lengths": "its lengths are in another order",
     "spin frame": "it is in the {key} frame",
     "degrees": "it is in degrees per second",
     "sign of the spin": "its sign is reversed",
@@ -97,8 +99,10 @@ SHOWN_BY = {
     "scale": "heights at rest are {rests:.4g} times the expected ones",
     "centre of mass": "heights at rest on opposite faces differ by {rests_mm:.2g} mm",
     "quaternion": "{percent:.0f} % of the tosses end at rest on a face as recorded, {expected_percent:.0f} % with the remedy",
+    "lengths": "with the remedy, they differ by {rests_mm:.2g} mm",
 }
 SEPARATED_BY = {
+    "lengths": "let the body rest on all of its faces",
     "quaternion": "look up which quaternions the software writes that made the file",
     "unit": "compare a length in the recording with the true one, and the rate with a clock in the picture",
     "scale": "measure the height at rest on a known face, or the rate of the camera with a clock in the picture",
@@ -130,7 +134,13 @@ def remedy(finding: Finding) -> str:
 def _values(finding: Finding) -> dict[str, Any]:
     """The columns of a finding, with its numbers in other units."""
     value, expected = finding.value, finding.expected
-    numbers: dict[str, Any] = {"mm": 1e3 * value, "ms": 1e3 * value, "expected_ms": 1e3 * expected, "rests_mm": 1e3 * finding.rests}
+    numbers: dict[str, Any] = {
+        "mm": 1e3 * value,
+        "ms": 1e3 * value,
+        "expected_ms": 1e3 * expected,
+        "rests_mm": 1e3 * finding.rests,
+        "expected_mm": 1e3 * expected,
+    }
     numbers |= {"mm_off": abs(1e3 * value), "side": "below" if value < 0.0 else "above"}
     numbers |= {"degrees": math.degrees(value), "percent": 100.0 * value, "expected_percent": 100.0 * expected}
     return vars(finding) | numbers

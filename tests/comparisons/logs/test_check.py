@@ -130,6 +130,15 @@ def test_the_reading_that_fits_best_is_named_and_all_that_fit_as_well(change: Ca
     assert (found.kind, [cause.keys for cause in found.causes]) == ("quaternion", causes)
 
 
+def test_the_flight_of_the_tracked_point_decides_between_readings_in_which_a_cylinder_turns_alike() -> None:
+    cylinder = {"shape": "cylinder", "radius": 0.03, "half_length": 0.06, "mass": 0.4}
+    header = {"body": cylinder, "tracked_point": [0.02, 0.03, 0.01]}
+    log = made(2, 6, NOISE, header=header, offset=(0.02, 0.03, 0.01), spin=10.0, durations=(0.2, 0.3)).log
+    check = log_check(changed(log, orientation=lambda toss: conjugate(toss.orientation)))
+    [found] = [one for one in check.findings if one.kind == "quaternion"]
+    assert [cause.keys for cause in found.causes] == [DIRECTION]
+
+
 def with_body(log: Log, body: dict[str, Any]) -> Log:
     """The recording with another body in its header."""
     return replace(log, header=validated(Header, "header", log.header.model_dump() | {"body": body}))

@@ -9,7 +9,8 @@ from support.tosses import BRICK, made
 from dropspin.comparisons.logs.flights import flights_of
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.log import Log, Toss
-from dropspin.comparisons.logs.recording_faults import of_floor, orders_of_axes
+from dropspin.comparisons.logs.other_readings import of_lengths, orders_of_axes
+from dropspin.comparisons.logs.recording_faults import of_floor
 from dropspin.comparisons.logs.rest import Rests, level_share, rests
 from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import Array
@@ -53,6 +54,19 @@ def test_heights_at_rest_tell_edges_in_another_order_from_moments() -> None:
     wrong = replace(log, header=log.header.corrected({"body.half_extents": [0.07, 0.04, 0.05], "body.inertia": [5.5e-4, 9.9e-4, 8.7e-4]}))
     right = [cause for inertia, cause in orders_of_axes(wrong) if np.array_equal(inertia, log.header.body.inertia_tensor)]
     assert [(cause.name, cause.keys["body.half_extents"]) for cause in right] == [("body axes", [0.04, 0.05, 0.07])]
+
+
+def test_heights_at_rest_name_edges_in_another_order_beside_moments_in_numbers() -> None:
+    """The moments are right, so that the motion shows nothing. A floor that is too high moves all heights alike."""
+    log = resting(1.0, np.array([1e-4, 2e-4, -1e-4]))
+    assert list(of_lengths(log)) == []
+    wrong = log.header.corrected({"body.half_extents": [0.07, 0.05, 0.04], "floor_height": 0.1})
+    [found] = of_lengths(replace(log, header=wrong))
+    assert (found.kind, [cause.keys for cause in found.causes]) == ("lengths", [{"body.half_extents": [0.04, 0.05, 0.07]}])
+    assert found.value == pytest.approx(np.std([0.03, 0.03, 0.0, 0.0, -0.03, -0.03], ddof=1), rel=0.01)
+    assert found.rests < 5e-4
+    both_edges = log.header.corrected({"body.half_extents": [0.05, 0.05, 0.07]})
+    assert list(of_lengths(replace(log, header=both_edges))) == []
 
 
 def test_a_record_that_is_not_quite_level_does_not_change_the_scale() -> None:

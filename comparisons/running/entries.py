@@ -4,8 +4,8 @@ import sys
 from collections.abc import Iterable, Sequence
 
 from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissing
-from dropspin.comparisons.engines.registry import BUILT_IN, is_foreign, parsed
 from dropspin.comparisons.engines.registry import engine as engine_named
+from dropspin.comparisons.engines.registry import is_foreign, parsed
 from dropspin.comparisons.engines.stand_in import Traits, stand_in, traits
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.inputs import EngineEntry, described_value, several
@@ -36,33 +36,24 @@ def engine_entry(engine: Engine | str, resources: ResourceLimits = ONE_MINUTE) -
     return EngineEntry(found.label, found)
 
 
-def engine_entries(engines: Engine | str | Iterable[Engine | str], default: Sequence[str] = ()) -> list[EngineEntry]:
-    """One engine or several, or default ones if none is given, each once.
+def engine_entries(
+    engines: Engine | str | Iterable[Engine | str], default: Sequence[str] = (), resources: ResourceLimits = ONE_MINUTE
+) -> list[EngineEntry]:
+    """One engine or several, or default ones if none is given.
 
     Raises:
-        DropspinError: Two different engines have the same name.
+        DropspinError: Two engines have the same name.
     """
-    entries: dict[str, EngineEntry] = {}
-    given: dict[str, Engine | str] = {}
-    for asked in several("engines", engines) or default:
-        entry = engine_entry(asked)
-        earlier = given.setdefault(entry.label, asked)
-        first, second = _origin(earlier), _origin(asked)
-        if first is not second and not (isinstance(first, str) and first == second):
-            both = " and ".join(
-                one if isinstance(one, str) else f"{type(one).__module__}:{type(one).__qualname__}" for one in (earlier, asked)
-            )
-            raise DropspinError(f"engines: {both} both have the name {entry.label}; give one of them another name.")
-        entries.setdefault(entry.label, entry)
-    return list(entries.values())
-
-
-def _origin(asked: Engine | str) -> Engine | str:
-    """What two engines of one label have in common if they are the same: the name of an engine, or the object of a user's own one."""
-    if isinstance(asked, str):
-        return parsed(asked.strip())[0]
-    is_own = asked.name in BUILT_IN and type(asked).__module__ == BUILT_IN[asked.name].module
-    return asked.name if is_own else asked
+    asked = several("engines", engines) or list(default)
+    entries = [engine_entry(one, resources) for one in asked]
+    given: dict[str, str] = {}
+    for entry, one in zip(entries, asked, strict=True):
+        words = one if isinstance(one, str) else f"{type(one).__module__}:{type(one).__qualname__}"
+        if entry.label in given:
+            both = f"{given[entry.label]} and {words} both have the name {entry.label}"
+            raise DropspinError(f"engines: {both}; name one of them, or give one another name.")
+        given[entry.label] = words
+    return entries
 
 
 def present_entry(engine: Engine | str) -> EngineEntry:

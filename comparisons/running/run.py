@@ -13,7 +13,7 @@ from dropspin.comparisons.measuring.batch import compile_states
 from dropspin.comparisons.measuring.metrics import values_of
 from dropspin.comparisons.results.provenance import provenance
 from dropspin.comparisons.results.results import Results, joined
-from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.entries import engine_entries
 from dropspin.comparisons.running.forecast import Forecast, forecast
 from dropspin.comparisons.running.foreign_motions import verify_motion
 from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, as_scenes, ignore, several, verify_time_step
@@ -129,7 +129,7 @@ def _request(
     """
     chosen = as_scenes(scenes)
     asked, dts = several("engines", engines), several("dt", dt)
-    entries = [engine_entry(one, resources) for one in asked]
+    entries = engine_entries(asked, resources=resources)
     for name, given in (("scenes", chosen), ("engines", entries), ("dt", dts)):
         if not given:
             raise DropspinError(f"{name}: got none; give at least one.")
@@ -141,8 +141,6 @@ def _request(
         verify_expectations(scene, truth, labels)
     if len(set(dts)) < len(dts):
         raise DropspinError(f"dt: a time step is given twice ({', '.join(f'{step:g}' for step in dts)}); give each once.")
-    if len(set(labels)) < len(labels):
-        raise DropspinError(f"an engine is given twice: {', '.join(labels)}; give each once.")
     names = [scene.name for scene in chosen]
     asked_for = {"scenes": names, "engines": labels, "dts": list(dts), "time_limit": resources.processor_time, "quick": quick}
     adapters = {entry.label: code_of(entry.engine) for entry in entries if entry.engine is not None}

@@ -137,13 +137,12 @@ def is_near(pieces: Array, acceleration: Array, error: float) -> NDArray[np.bool
 
 def standard_error(toss: Toss, size: int, noise: float) -> float:
     """Of the acceleration of a parabola through so many frames with a noise of positions [m], about, in m/s²."""
-    return noise * math.sqrt(720.0 / size**5) / float(np.median(np.diff(toss.t))) ** 2
+    return noise * math.sqrt(720.0 / size**5) / toss.time_step**2
 
 
 def window_size(toss: Toss, noise: float = 0.0, acceleration: Array | None = None) -> int:
     """Frames of the pieces in which a fall of an acceleration [m/s²], shape (3,), is looked for with a noise of positions [m]."""
-    dt = float(np.median(np.diff(toss.t)))
-    fewest = max(FEWEST_FRAMES, round(WINDOW / dt))
+    fewest = max(FEWEST_FRAMES, round(WINDOW / toss.time_step))
     if acceleration is None:
         return fewest
     allowed = FARTHEST * float(np.linalg.norm(acceleration))

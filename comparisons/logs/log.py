@@ -6,6 +6,7 @@ What the file shows by itself, without the laws of motion, are facts: rows that 
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,11 @@ class Toss:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    @cached_property
+    def time_step(self) -> float:
+        """The median time between two frames [s]."""
+        return float(np.median(np.diff(self.t)))
 
 
 @dataclass(frozen=True)

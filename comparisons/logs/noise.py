@@ -62,7 +62,6 @@ class Samples:
     own: Array
     shared: Array
 
-    @cached_property
     def spectrum(self) -> tuple[Array, Array]:
         """Eigenvalues of the covariance of w for slow = 1, shape (n,), and the products of all columns in each.
 
@@ -76,16 +75,6 @@ class Samples:
         columns = np.concatenate([own, rest], axis=1).reshape(len(self.t), -1)
         by_mode = (modes.T @ columns).reshape(len(self.t), 3, -1)
         return np.maximum(eigenvalues, 0.0), by_mode.transpose(0, 2, 1) @ by_mode
-
-    def without_own(self, noise: Noise) -> tuple[Array, float]:
-        """Weighted products of shared and values, perpendicular to own, shape (m + 1, m + 1), and the log det of the likelihood."""
-        eigenvalues, products = self.spectrum
-        variances = noise.white**2 + noise.slow**2 * eigenvalues
-        whole, k = np.tensordot(1.0 / variances, products, axes=1), self.own.shape[2]
-        own = np.linalg.cholesky(whole[:k, :k])
-        across = np.linalg.solve(own, whole[:k, k:])
-        determinant = 3.0 * float(np.log(variances).sum()) + 2.0 * float(np.log(np.diag(own)).sum())
-        return whole[k:, k:] - across.T @ across, determinant
 
     @property
     def freedom(self) -> int:
@@ -160,10 +149,13 @@ def regression(flights: Sequence[Samples]) -> Regression:
     rounding = ROUNDING * (max(float(np.abs(samples.values).max()) for samples in flights) or 1.0)  # a body that does not turn has 0
     weights, shared = np.ones(len(flights)), flights[0].shared.shape[2]
 
+    eigenvalues, spectra = _padded([samples.spectrum() for samples in flights])
+    own = flights[0].own.shape[2]
+
     def parts(log_ratio: float) -> tuple[Array, Array, float]:
-        reduced = [samples.without_own(Noise(1.0, unit * 10.0**log_ratio)) for samples in flights]
-        products = np.array([product for product, _ in reduced])
-        return products, _solution(products, weights, shared), sum(determinant for _, determinant in reduced)
+        variances = 1.0 + (unit * 10.0**log_ratio) ** 2 * eigenvalues
+        products, determinants = _without_own(variances, spectra, own)
+        return products, _solution(products, weights, shared), float(determinants.sum())
 
     def left_over(products: Array, theta: Array) -> Array:
         residual = np.append(theta, -1.0)
@@ -189,6 +181,25 @@ def regression(flights: Sequence[Samples]) -> Regression:
     information = scale[:, np.newaxis, np.newaxis] * products[:, :shared, :shared]
     scores = scale[:, np.newaxis] * (products[:, :shared, shared] - products[:, :shared, :shared] @ theta)
     return Regression(theta, noise, weights, information, scores, int(freedom.sum()) - shared)
+
+
+def _padded(spectra: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Spectra of flights as arrays, in which those of shorter flights end with zeros."""
+    longest, columns = max(len(values) for values, _ in spectra), spectra[0][1].shape[1]
+    eigenvalues, products = np.zeros((len(spectra), longest)), np.zeros((len(spectra), longest, columns, columns))
+    for row, (values, of_flight) in enumerate(spectra):
+        eigenvalues[row, : len(values)], products[row, : len(values)] = values, of_flight
+    return eigenvalues, products
+
+
+def _without_own(variances: Array, spectra: Array, own: int) -> tuple[Array, Array]:
+    """Weighted products of shared and values, perpendicular to own, shape (flights, m + 1, m + 1), and log determinants of likelihoods."""
+    flights, count, columns, _ = spectra.shape
+    whole = ((1.0 / variances)[:, np.newaxis] @ spectra.reshape(flights, count, -1)).reshape(flights, columns, columns)
+    root = np.linalg.cholesky(whole[:, :own, :own])
+    across = np.linalg.solve(root, whole[:, :own, own:])
+    determinants = 3.0 * np.log(variances).sum(axis=1) + 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+    return whole[:, own:, own:] - across.transpose(0, 2, 1) @ across, determinants
 
 
 def _solution(products: Array, weights: Array, shared: int) -> Array:

@@ -125,7 +125,7 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
 
 def _interrupted(flight: Flight, shared: Array, noise: Noise, *, by_bad_frames: bool) -> int:
     """How many frames are missing at the end of a flight, or are not of it: the number with which the next ones are of it; 0 if none."""
-    dt = float(np.median(np.diff(flight.toss.t)))
+    dt = flight.toss.time_step
     for number in (1, 2, 3):
         # The last frame of a flight was left out before an impact; the frame after it is the first one that is not of the flight.
         first, delay = (flight.end + 1 + number, 0.0) if by_bad_frames else (flight.end + 1, number * dt)

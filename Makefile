@@ -15,6 +15,8 @@ NPM_havok := @babylonjs/havok
 
 # Many processes start in tests: with the bytecode of the package kept, beside numba's kernels, each costs a third.
 unexport PYTHONDONTWRITEBYTECODE
+# Two workers on two processors: threads of BLAS, whose matrices are small here, would only wait for each other.
+test test-browser test-all fuzz coverage: export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: report test test-browser test-engines test-all fuzz faults coverage bench examples docs site lint clean
 
@@ -44,7 +46,7 @@ faults: $(VENV)/.installed-dev        ## engines with one planted fault each aga
 
 coverage: $(VENV)/.installed-dev      ## how often intervals are right: docs/coverage.md, and the table in docs/measured.md
 	PYTHONPATH=tests $(BIN)/python -m support.interval_coverage
-	OPENBLAS_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m support.log_coverage
+	PYTHONPATH=tests $(BIN)/python -m support.log_coverage
 
 bench: $(VENV)/.installed             ## speed beside the engines, as ratios: out/bench.json, out/bench.svg
 	$(BIN)/python benchmarks/speed.py

@@ -78,15 +78,18 @@ def status(text: str) -> Iterator[None]:
 
 @contextmanager
 def share_bar(title: str) -> Iterator[Callable[[str, float], None]]:
-    """A progress bar on a terminal; elsewhere, one line."""
+    """A progress bar on a terminal; elsewhere, one line when the work begins, so that bad input is one line."""
+    has_begun = False
 
     def on_progress(work: str, share: float) -> None:
+        nonlocal has_begun
         stop_if_interrupted()
+        if bar.disable and not has_begun:
+            echo(f"running {title}", err=True)
+        has_begun = True
         bar.update(task, completed=share, description=safe(f"{title}: {work}"))
 
     with _bar(BarColumn(), TimeRemainingColumn()) as bar:
-        if bar.disable:
-            echo(f"running {title}", err=True)
         task = bar.add_task(safe(title), total=1.0)
         yield on_progress
 

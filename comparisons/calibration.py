@@ -12,7 +12,7 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.running.driving import Breakdown, verify_accepted
-from dropspin.comparisons.running.entries import present_entry
+from dropspin.comparisons.running.engine_entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry, verify_time_step
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses

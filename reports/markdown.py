@@ -2,7 +2,7 @@
 
 import re
 
-from dropspin.comparisons.results.folder import file_name
+from dropspin.comparisons.results.complete_folders import file_name
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
 
 

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-from dropspin.comparisons.results.folder import read_stored, replaced_folder
+from dropspin.comparisons.results.complete_folders import read_stored, replaced_folder
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.run_file import ARRAY_FILE, FILE, parsed
 from dropspin.comparisons.results.store import load_results, save

@@ -46,10 +46,10 @@ Source of the exact solutions: `dropspin.scenarios.truths`.
 import numpy as np
 
 from dropspin.scenarios.bodies.surface import depth_below_centre
-from dropspin.scenarios.draws import Draws
 from dropspin.scenarios.errors import DropspinError, SceneError
-from dropspin.scenarios.families import FAMILIES, OF_PLAIN_SHAPES
 from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.random_families import FAMILIES, OF_PLAIN_SHAPES
+from dropspin.scenarios.random_variates import Draws
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 from dropspin.scenarios.truths import Impact, truth_for

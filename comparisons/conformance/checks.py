@@ -11,7 +11,7 @@ from dropspin.comparisons.conformance.outcomes import OUTCOMES, CheckOutcome, Ch
 from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.engines.base import Diverged, Engine
 from dropspin.comparisons.running.driving import Breakdown
-from dropspin.comparisons.running.entries import present_entry
+from dropspin.comparisons.running.engine_entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from dropspin.comparisons.conformance.impacts import turning_impulse
-from dropspin.comparisons.conformance.offset import off_centre
 from dropspin.comparisons.conformance.outcomes import digits_that_differ, instead
+from dropspin.comparisons.conformance.point_beside_centre import off_centre
 from dropspin.comparisons.conformance.probes import Probe, differences
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS

@@ -19,7 +19,7 @@ from dropspin.comparisons.diagnosis.sliding import creep, roll, slide
 from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.running.driving import Breakdown
-from dropspin.comparisons.running.entries import present_entry
+from dropspin.comparisons.running.engine_entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits

@@ -17,7 +17,7 @@ from dropspin.comparisons.logs.grids import FIRST_GRID, Problem, Profile, proble
 from dropspin.comparisons.logs.intervals import LEVEL, expanded
 from dropspin.comparisons.logs.log import Log
 from dropspin.comparisons.running.driving import Breakdown
-from dropspin.comparisons.running.entries import engine_entries
+from dropspin.comparisons.running.engine_entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring.contacts import ContactResiduals, contact_residuals
-from dropspin.comparisons.measuring.motions import Motions
-from dropspin.comparisons.measuring.states import States
+from dropspin.comparisons.measuring.motion_quantities import Motions
+from dropspin.comparisons.measuring.state_quantities import States
 from dropspin.scenarios import Scenario, Trajectory, Truth
 from dropspin.scenarios.mechanics import apex
 from dropspin.scenarios.model import TOUCHING

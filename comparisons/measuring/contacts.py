@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.measuring.motions import Motions
+from dropspin.comparisons.measuring.motion_quantities import Motions
 from dropspin.scenarios import DropspinError, Scenario, Trajectory
 from dropspin.scenarios.mechanics import angular_momentum
 from dropspin.scenarios.rotations import cross, length

@@ -10,7 +10,7 @@ from dropspin.comparisons.measuring import errors_over_time as errors
 from dropspin.comparisons.measuring import requirements
 from dropspin.comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison, Unresolved
 from dropspin.comparisons.measuring.metric import Applies, Components, Measure, Metric
-from dropspin.comparisons.measuring.motions import Motions, at_rows
+from dropspin.comparisons.measuring.motion_quantities import Motions, at_rows
 from dropspin.scenarios import Scenario, Trajectory, Truth, truth_for
 from dropspin.scenarios.mechanics import angular_momentum, apex
 from dropspin.scenarios.rotations import angle_between_orientations, cross, length

@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import Field
 
 from dropspin.comparisons.engines.packages import is_npm, numbers_of
-from dropspin.comparisons.results.folder import sha256
+from dropspin.comparisons.results.complete_folders import sha256
 from dropspin.scenarios import load
 from dropspin.scenarios.loading import read_toml
 from dropspin.scenarios.tables import Table

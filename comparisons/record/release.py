@@ -19,10 +19,10 @@ from dropspin.comparisons.engines.registry import engine as engine_named
 from dropspin.comparisons.engines.stand_in import code_of
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
-from dropspin.comparisons.results.folder import sha256
+from dropspin.comparisons.results.complete_folders import sha256
 from dropspin.comparisons.results.provenance import STAMPED
 from dropspin.comparisons.running.driving import Breakdown, divergence, record, record_batch, verify_accepted
-from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses

@@ -21,7 +21,7 @@ from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.engines.registry import parsed
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.record.environments import without_paths
-from dropspin.comparisons.results.folder import read_stored, sha256, written_whole
+from dropspin.comparisons.results.complete_folders import read_stored, sha256, written_whole
 from dropspin.comparisons.results.provenance import processor
 from dropspin.comparisons.results.table import schema_of, stored_table
 from dropspin.scenarios import DropspinError

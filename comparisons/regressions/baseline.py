@@ -22,8 +22,8 @@ from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.symmetries import kind_of
 from dropspin.comparisons.regressions.attribution import ACCEPTED
 from dropspin.comparisons.regressions.changes import KEY, Digests, leaves
+from dropspin.comparisons.results.complete_folders import written_whole
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
-from dropspin.comparisons.results.folder import written_whole
 from dropspin.comparisons.results.provenance import digest
 from dropspin.comparisons.results.table import OF_SYMMETRIES
 from dropspin.scenarios import DropspinError

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import from_json
 
-from dropspin.comparisons.results.folder import sha256
+from dropspin.comparisons.results.complete_folders import sha256
 from dropspin.comparisons.results.provenance import MEASURING
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import validated

@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from dropspin.comparisons.results import earlier
+from dropspin.comparisons.results import older_formats
+from dropspin.comparisons.results.complete_folders import file_name, read_stored, sha256
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, SAMPLES, EnsembleOutcome
-from dropspin.comparisons.results.folder import file_name, read_stored, sha256
 from dropspin.comparisons.results.results import Results, TrajectoryKey
 from dropspin.comparisons.results.run_file import FILE, FORMAT, TABLE, Case, RunFile, parsed, signed, verified, verify_checksum
 from dropspin.comparisons.results.table import results_table
@@ -72,10 +72,10 @@ def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
     """
     try:
         content = parsed(read_stored(Path(folder), FILE))
-        if isinstance(content, dict) and content.get("format") in (FORMAT, earlier.FORMAT):
+        if isinstance(content, dict) and content.get("format") in (FORMAT, older_formats.FORMAT):
             file = verified(content)
-            if file.format == earlier.FORMAT:
-                content = earlier.with_current_labels(content)
+            if file.format == older_formats.FORMAT:
+                content = older_formats.with_current_labels(content)
                 file = RunFile.model_validate(content)
             return _loaded(Path(folder), file, content["provenance"], arrays)
     except (OSError, ValueError, DropspinError) as error:
@@ -88,7 +88,7 @@ def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
 
 def _loaded(folder: Path, file: RunFile, provenance: Mapping[str, Any], arrays: bool) -> Results:
     scenes = {name: _scene(file, name) for name in file.scenes}
-    is_earlier = file.format == earlier.FORMAT
+    is_earlier = file.format == older_formats.FORMAT
     read_table = partial(results_table, scenes=scenes, engines=file.engines, dts=file.provenance.asked.dts, is_earlier=is_earlier)
     rows = _from_file(folder, TABLE, file, read_table)
     read_outcome = partial(_outcome, most=QUICK_MEMBERS if file.provenance.asked.quick else None)

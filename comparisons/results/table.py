@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 from dropspin.comparisons.judging.verdicts import VERDICTS, Basis, Cause, Judgement, Verdict
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.symmetries import kind_of
-from dropspin.comparisons.results.earlier import with_basis
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
+from dropspin.comparisons.results.older_formats import with_basis
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.validation import shown
 

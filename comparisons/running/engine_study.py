@@ -32,8 +32,8 @@ from dropspin.comparisons.results.provenance import motion_digest
 from dropspin.comparisons.results.table import Case, Measurement
 from dropspin.comparisons.running.ablation import explaining, written_out
 from dropspin.comparisons.running.driving import Breakdown, divergence
+from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.engine_run import EngineRun, run_engine
-from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.perturbed_starts import changes_of_metrics, number_of_simulations
 from dropspin.comparisons.running.processes import EngineProcesses

@@ -10,8 +10,8 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import Diverged, Engine
 from dropspin.comparisons.judging.verdicts import Judgement
-from dropspin.comparisons.measuring.batch import compute_states
-from dropspin.comparisons.measuring.states import States
+from dropspin.comparisons.measuring.batch_quantities import compute_states
+from dropspin.comparisons.measuring.state_quantities import States
 from dropspin.comparisons.measuring.tolerances import OF_TWO_DRAWS, tolerance
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, SAMPLES, EnsembleOutcome
 from dropspin.comparisons.running.driving import record_batch

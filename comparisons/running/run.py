@@ -9,11 +9,11 @@ from typing import Any
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.stand_in import code_of
 from dropspin.comparisons.judging.expectations import verify_expectations
-from dropspin.comparisons.measuring.batch import compile_states
+from dropspin.comparisons.measuring.batch_quantities import compile_states
 from dropspin.comparisons.measuring.metrics import values_of
 from dropspin.comparisons.results.provenance import provenance
 from dropspin.comparisons.results.results import Results, joined
-from dropspin.comparisons.running.entries import engine_entries
+from dropspin.comparisons.running.engine_entries import engine_entries
 from dropspin.comparisons.running.forecast import Forecast, forecast
 from dropspin.comparisons.running.foreign_motions import verify_motion
 from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, as_scenes, ignore, several, verify_time_step

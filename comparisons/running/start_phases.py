@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from dropspin.comparisons.judging.convergence import JUMPING, SeriesPoint
-from dropspin.comparisons.measuring.batch import compute_cases, compute_states
+from dropspin.comparisons.measuring.batch_quantities import compute_cases, compute_states
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS, Average
 from dropspin.comparisons.measuring.metrics import metrics_for
-from dropspin.comparisons.measuring.states import States
+from dropspin.comparisons.measuring.state_quantities import States
 from dropspin.comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
 from dropspin.comparisons.running.engine_run import EngineRun
 from dropspin.comparisons.running.inputs import MOST_ROWS

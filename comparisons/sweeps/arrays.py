@@ -17,8 +17,8 @@ from pydantic import ValidationError
 
 from dropspin import reference_impl
 from dropspin.comparisons.engines.wang import Wang, reference_bodies, reference_world
-from dropspin.comparisons.measuring.batch import BATCH_BYTES, motions_side_by_side
-from dropspin.comparisons.measuring.motions import Setup
+from dropspin.comparisons.measuring.batch_quantities import BATCH_BYTES, motions_side_by_side
+from dropspin.comparisons.measuring.motion_quantities import Setup
 from dropspin.comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS
 from dropspin.comparisons.running.verification import UNIT_TOLERANCE
 from dropspin.comparisons.sweeps.jobs import OPTION, Jobs, scene_of

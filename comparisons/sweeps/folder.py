@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 from fsspec.implementations.local import LocalFileSystem
 from pydantic import AliasPath, BaseModel, ConfigDict, Field, ValidationError
 
-from dropspin.comparisons.results.folder import is_unfinished, written_whole
+from dropspin.comparisons.results.complete_folders import is_unfinished, written_whole
 from dropspin.comparisons.results.table import schema_of, stored_table
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS
 from dropspin.scenarios import DropspinError

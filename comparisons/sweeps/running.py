@@ -16,7 +16,7 @@ from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimi
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.sweeps.folder import SweepFolder
 from dropspin.comparisons.sweeps.jobs import Sweep
-from dropspin.comparisons.sweeps.work import Work, installed_versions
+from dropspin.comparisons.sweeps.parts import Work, installed_versions
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import DropspinError
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.comparisons.running.entries import present_entry
+from dropspin.comparisons.running.engine_entries import present_entry
 from dropspin.comparisons.running.inputs import verify_time_step
 from dropspin.comparisons.sweeps.axes import Drawn, Listed, Spaced, Spacing, SweepAxis
 from dropspin.comparisons.sweeps.jobs import OPTION, Sweep, configured

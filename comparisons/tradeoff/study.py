@@ -15,7 +15,7 @@ import numpy as np
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.metrics import leading_metric, metrics_for
 from dropspin.comparisons.running.driving import Breakdown
-from dropspin.comparisons.running.entries import engine_entries
+from dropspin.comparisons.running.engine_entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, described_value, ignore
 from dropspin.comparisons.running.parallel import as_jobs, results_in_parallel
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits

@@ -32,7 +32,7 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
 
     from dropspin.comparisons.regressions.baseline import Baseline, load_baseline, write_baseline
     from dropspin.comparisons.regressions.checking import accept
-    from dropspin.comparisons.results.folder import one_at_a_time
+    from dropspin.comparisons.results.complete_folders import one_at_a_time
     from dropspin.comparisons.results.store import load_results
     from dropspin.reports.document import Document, Sentences
     from dropspin.reports.stories.check import accepted_sentences

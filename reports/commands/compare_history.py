@@ -23,7 +23,7 @@ def compare_history_command(runs: tuple[str, ...], output: str, json_output: boo
     RUN is a folder that dropspin run -o wrote, or a folder of such folders. Runs are sorted by start time.
     """
     from dropspin.comparisons.regressions.comparing import history
-    from dropspin.comparisons.results.folder import study_folder
+    from dropspin.comparisons.results.complete_folders import study_folder
     from dropspin.reports.stories.history import rows
     from dropspin.reports.study_files import write_history
     from dropspin.reports.terminal.progress import status
@@ -43,7 +43,7 @@ def _load_runs(places: tuple[str, ...]) -> "dict[str, Results]":
     Raises:
         DropspinError: A given folder is neither a run nor a folder of runs.
     """
-    from dropspin.comparisons.results.folder import is_unfinished
+    from dropspin.comparisons.results.complete_folders import is_unfinished
     from dropspin.comparisons.results.store import load_results
     from dropspin.scenarios import DropspinError
     from dropspin.scenarios.text import printable

@@ -31,7 +31,7 @@ def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, 
     from rich.console import Console
 
     from dropspin.comparisons.conformance.checks import CHECKS, conform
-    from dropspin.comparisons.running.entries import present_entry
+    from dropspin.comparisons.running.engine_entries import present_entry
     from dropspin.reports.stories import conform as view
     from dropspin.reports.terminal.rows import print_json_or, print_row
 

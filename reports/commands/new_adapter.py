@@ -22,7 +22,7 @@ def new_adapter_command(name: str, output: str) -> None:
 
     NAME is the name of a Python module, such as my_engine. The class in it is then MyEngine, and results have the name my-engine.
     """
-    from dropspin.comparisons.results.folder import study_folder
+    from dropspin.comparisons.results.complete_folders import study_folder
     from dropspin.scenarios import DropspinError
 
     adapter = _class_name(name)

@@ -27,7 +27,7 @@ def write_text(path: str, text: str, *, append: bool = False) -> None:
     Raises:
         DropspinError: The file cannot be written.
     """
-    from dropspin.comparisons.results.folder import written_whole
+    from dropspin.comparisons.results.complete_folders import written_whole
     from dropspin.scenarios import DropspinError
 
     target = Path(path)

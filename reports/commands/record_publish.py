@@ -19,7 +19,7 @@ def record_publish_command(record: str, output: str) -> None:
     documentation's site, it links to the documentation.
     """
     from dropspin.comparisons.record.findings import others, read
-    from dropspin.comparisons.results.folder import replaced_folder
+    from dropspin.comparisons.results.complete_folders import replaced_folder
     from dropspin.reports.html.record import INDEX, Site, files_of_site
 
     releases = read(record)

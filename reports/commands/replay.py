@@ -28,7 +28,7 @@ def replay_command(
     On the page you can play the motions at any speed, go to any time, rotate the view, and see contacts and impulses. The page is one
     file and needs no network.
     """
-    from dropspin.comparisons.results.folder import written_whole
+    from dropspin.comparisons.results.complete_folders import written_whole
     from dropspin.comparisons.results.store import load_results
     from dropspin.reports.html.replay import replay_page
     from dropspin.reports.plots.run_charts import time_charts

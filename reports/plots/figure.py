@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from dropspin.comparisons.results.folder import written_whole
+from dropspin.comparisons.results.complete_folders import written_whole
 from dropspin.reports.plots.chart import Chart, draw
 from dropspin.reports.plots.style import SIZES, ink, style
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dropspin.comparisons.engines.packages import install_extra
-from dropspin.comparisons.results.folder import written_whole
+from dropspin.comparisons.results.complete_folders import written_whole
 from dropspin.reports.plots.colours import human_label
 from dropspin.reports.replay.motions import Motion, Replay
 from dropspin.scenarios import DropspinError

@@ -27,7 +27,7 @@ def engine_rows() -> Rows:
     """The engines that can be chosen by name: whether they are installed, what they are or how to install them, and their options."""
     from dropspin.comparisons.engines.registry import absence, engine_names
     from dropspin.comparisons.engines.stand_in import StandIn
-    from dropspin.comparisons.running.entries import engine_entry
+    from dropspin.comparisons.running.engine_entries import engine_entry
 
     rows = []
     for name in engine_names():

@@ -80,7 +80,7 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
         DropspinError: The engine cannot run, or breaks down while it builds the scene.
     """
     from dropspin.comparisons.running.driving import Breakdown
-    from dropspin.comparisons.running.entries import present_entry
+    from dropspin.comparisons.running.engine_entries import present_entry
     from dropspin.comparisons.running.inputs import verify_time_step
     from dropspin.comparisons.running.process_limits import ONE_MINUTE
     from dropspin.comparisons.running.processes import EngineProcesses
@@ -153,7 +153,7 @@ def setting_rows(engine_name: str) -> Rows:
     Raises:
         DropspinError: There is no such engine, or it cannot be imported.
     """
-    from dropspin.comparisons.running.entries import present_entry
+    from dropspin.comparisons.running.engine_entries import present_entry
 
     engine = present_entry(engine_name).adapter
     rows = [(name, values[0], "", " | ".join(values), "", "option of the adapter") for name, values in engine.choices.items()]

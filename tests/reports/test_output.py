@@ -8,7 +8,7 @@ from time import sleep
 import pytest
 from support.cli import dropspin
 
-from dropspin.comparisons.results.folder import one_at_a_time, study_folder, written_whole
+from dropspin.comparisons.results.complete_folders import one_at_a_time, study_folder, written_whole
 from dropspin.reports.output import write_table
 
 

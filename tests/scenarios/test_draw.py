@@ -6,8 +6,8 @@ import pytest
 from dropspin.scenarios import DropspinError, SceneError, load, truth_for
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.draw import draw, drawn_scene
-from dropspin.scenarios.draws import Draws
-from dropspin.scenarios.families import FAMILIES, GRAVITY, LENGTH, MASS, RESTITUTION
+from dropspin.scenarios.random_families import FAMILIES, GRAVITY, LENGTH, MASS, RESTITUTION
+from dropspin.scenarios.random_variates import Draws
 
 
 @pytest.fixture(scope="module")

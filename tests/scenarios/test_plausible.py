@@ -9,7 +9,7 @@ from support.cli import dropspin
 
 from dropspin.scenarios import SceneError, load
 from dropspin.scenarios.errors import SceneWarning
-from dropspin.scenarios.families import FAMILIES
+from dropspin.scenarios.random_families import FAMILIES
 
 BOX = {"shape": "box", "half_extents": [0.005, 0.01, 0.01], "mass": 0.1}
 FLOOR = {"floor": {"restitution": 0.5, "friction": 0.3}, "gravity": {"acceleration": [0.0, -9.8, 0.0]}}

@@ -9,7 +9,7 @@ from dropspin.comparisons.logs.flights import Flights, Start
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.log import Log, Toss
 from dropspin.comparisons.logs.noise import Noise, Regression
-from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.scenarios.rotations import multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 from dropspin.scenarios.variations import with_values

@@ -6,11 +6,11 @@ from mpmath import mp, mpf
 from scipy.spatial.transform import Rotation
 
 import dropspin as ds
-from dropspin.comparisons.measuring.batch import motions_side_by_side
+from dropspin.comparisons.measuring.batch_quantities import motions_side_by_side
 from dropspin.comparisons.measuring.comparison import Comparison
-from dropspin.comparisons.measuring.motions import Setup
+from dropspin.comparisons.measuring.motion_quantities import Setup
+from dropspin.comparisons.sweeps.parts import run_jobs
 from dropspin.comparisons.sweeps.spec import load_sweep
-from dropspin.comparisons.sweeps.work import run_jobs
 from dropspin.scenarios import Trajectory, truth_for
 from dropspin.scenarios.fields import with_fields
 from dropspin.scenarios.variations import in_units

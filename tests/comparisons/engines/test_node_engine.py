@@ -16,7 +16,7 @@ from dropspin import scenarios
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.node_process import node
 from dropspin.comparisons.running.driving import Breakdown
-from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 

@@ -7,7 +7,7 @@ import pytest
 from support import log_fits
 
 from dropspin.comparisons.logs.continued_tosses import STEPS_PER_FRAME, Launches, launches, poses, scene_of, usable
-from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.rotations import angle_between_orientations
 from dropspin.scenarios.state import ORIENTATION, POSITION

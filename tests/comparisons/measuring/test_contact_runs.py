@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import dropspin as ds
-from dropspin.comparisons.measuring.batch import motions_side_by_side
+from dropspin.comparisons.measuring.batch_quantities import motions_side_by_side
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.comparisons.measuring.motions import Motions, Setup
+from dropspin.comparisons.measuring.motion_quantities import Motions, Setup
 from dropspin.comparisons.running.run import measure
 from dropspin.scenarios import Trajectory, load, truth_for
 

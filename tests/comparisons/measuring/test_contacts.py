@@ -10,7 +10,7 @@ from support.engines import CORE, QUICK
 
 import dropspin as ds
 from dropspin import scenarios
-from dropspin.comparisons.measuring.batch import compute_cases
+from dropspin.comparisons.measuring.batch_quantities import compute_cases
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.contacts import RESIDUALS
 from dropspin.comparisons.measuring.requirements import obeys_contact_laws

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from dropspin.comparisons.record.store import HASH, stored
-from dropspin.comparisons.results.folder import sha256
+from dropspin.comparisons.results.complete_folders import sha256
 
 RECORD = Path(__file__).parents[3] / "record"
 

@@ -8,7 +8,7 @@ import pytest
 from dropspin.comparisons.record.findings import NEGLIGIBLE, Case, Release, changes, digits, periods, profile, read, successive
 from dropspin.comparisons.record.plan import load_plan
 from dropspin.comparisons.record.store import Record, machine
-from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.scenarios import DropspinError, load
 
 LABEL, SCENE, DT, METRIC = "mujoco", "spin-asymmetric", 0.01, "orientation_error"

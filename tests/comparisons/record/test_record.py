@@ -21,7 +21,7 @@ from dropspin.comparisons.record import environments, release, study
 from dropspin.comparisons.record.environments import measured, without_paths
 from dropspin.comparisons.record.plan import Plan, load_plan
 from dropspin.comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, machine, stored
-from dropspin.comparisons.results.folder import sha256
+from dropspin.comparisons.results.complete_folders import sha256
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.timing import TimedSteps
 from dropspin.scenarios import DropspinError, load

@@ -18,7 +18,7 @@ from dropspin.comparisons.robustness.failure_modes import SOUND, ExtendedMotion,
 from dropspin.comparisons.robustness.operating_point import OperatingPoint, in_nominal_units
 from dropspin.comparisons.robustness.runner import Runner
 from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, ScanPoint, find_limits, scan_axis
-from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.scenarios import DropspinError, Trajectory, load, truth_for

@@ -5,7 +5,7 @@ import pytest
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.running.ablation import explaining, shares, written_out
 from dropspin.comparisons.running.driving import simulate
-from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.run import measure, run
 from dropspin.reports.stories.failures import settings_that_explain as settings_of
 from dropspin.scenarios import load

@@ -4,8 +4,8 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
+from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.engine_study import EngineStudy
-from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.forecast import MEASURING, Forecast, forecast, simulations
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES

@@ -7,7 +7,7 @@ import sys
 import pytest
 from filelock import FileLock
 
-from dropspin.comparisons.results.folder import unfinished_folder
+from dropspin.comparisons.results.complete_folders import unfinished_folder
 from dropspin.comparisons.results.interrupts import interrupts_deferred
 
 PLANTED = """

@@ -19,7 +19,7 @@ from support import engines as made
 from support.cli import dropspin
 
 import dropspin as ds
-from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 

@@ -8,8 +8,8 @@ from support import engines as made
 
 import dropspin as ds
 from dropspin.comparisons.running import processes
+from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.engine_run import run_engine
-from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.start_phases import START_PHASES, start_phases
 
 DT = 0.01

@@ -12,7 +12,7 @@ import dropspin as ds
 from dropspin import scenarios
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.table import COLUMNS
-from dropspin.comparisons.running.entries import engine_entries
+from dropspin.comparisons.running.engine_entries import engine_entries
 from dropspin.scenarios import DropspinError, SceneError
 
 BALL = ds.load("drop-ball")

@@ -21,9 +21,9 @@ from dropspin.comparisons.running import cluster as connection
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.sweeps import running
 from dropspin.comparisons.sweeps.folder import read_sweep
+from dropspin.comparisons.sweeps.parts import Work
 from dropspin.comparisons.sweeps.running import run_sweep
 from dropspin.comparisons.sweeps.spec import load_sweep
-from dropspin.comparisons.sweeps.work import Work
 from dropspin.scenarios import DropspinError
 
 pytest.importorskip("distributed")

@@ -11,14 +11,14 @@ from support import engines as made
 
 import dropspin as ds
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.measuring.batch import motions_side_by_side
+from dropspin.comparisons.measuring.batch_quantities import motions_side_by_side
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.comparisons.measuring.motions import Motions, Setup
+from dropspin.comparisons.measuring.motion_quantities import Motions, Setup
 from dropspin.comparisons.running.verification import UNIT_TOLERANCE
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, concatenated, not_run, run_scenes, standard_metrics
+from dropspin.comparisons.sweeps.parts import run_jobs
 from dropspin.comparisons.sweeps.spec import load_sweep
-from dropspin.comparisons.sweeps.work import run_jobs
 from dropspin.scenarios import load, names
 
 SCENES = [name for name in names() if "slow" not in load(name).tags]

@@ -23,9 +23,9 @@ from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import Closed
 from dropspin.comparisons.sweeps.folder import read_sweep
+from dropspin.comparisons.sweeps.parts import Work
 from dropspin.comparisons.sweeps.running import run_sweep
 from dropspin.comparisons.sweeps.spec import load_sweep
-from dropspin.comparisons.sweeps.work import Work
 from dropspin.scenarios import DropspinError
 
 DROPSPIN = Path(sys.executable).with_name("dropspin")

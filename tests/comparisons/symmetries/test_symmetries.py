@@ -9,7 +9,7 @@ from support import engines as made
 
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES
-from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.symmetries.study import SCENES, findings_of, states_of, symmetries
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import DropspinError, load, truth_for

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dropspin.scenarios.bodies import body_of
-from dropspin.scenarios.draws import Draws
+from dropspin.scenarios.random_variates import Draws
 from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import UP, Array
 

@@ -4,9 +4,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from dropspin.comparisons.measuring.batch import motions_side_by_side
+from dropspin.comparisons.measuring.batch_quantities import motions_side_by_side
 from dropspin.comparisons.measuring.metrics import energy_drift, energy_gain, penetration
-from dropspin.comparisons.measuring.motions import Motions, Setup
+from dropspin.comparisons.measuring.motion_quantities import Motions, Setup
 from dropspin.comparisons.sweeps.outcomes import standard_metrics
 from dropspin.scenarios import Trajectory, load
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring.contact_runs import RESOLVED, STEADY, ContactRuns, contact_runs
-from dropspin.comparisons.measuring.states import Mask, States, StatesOfMany
+from dropspin.comparisons.measuring.state_quantities import Mask, States, StatesOfMany
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.ensemble import clearances
 from dropspin.scenarios.mechanics import energy_origin, scalar_product

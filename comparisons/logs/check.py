@@ -5,7 +5,7 @@ neither the motion nor the frames at rest tell them apart.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from dropspin.comparisons.logs.noise import Regression, regression
 from dropspin.comparisons.logs.other_readings import in_other_readings, of_lengths, of_quaternions, orders_of_axes
 from dropspin.comparisons.logs.recording_faults import of_floor, of_frames, of_rates
 from dropspin.comparisons.logs.rest import rests
+from dropspin.comparisons.running.inputs import ignore
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import unrotate
@@ -95,11 +96,12 @@ class Check:
         return not any(finding.kind in ("up", "unit", "quaternion", "body axes", "lengths", "floor", "below") for finding in self.findings)
 
 
-def log_check(recording: Flights | Log | str | Path) -> Check:
+def log_check(recording: Flights | Log | str | Path, on_progress: Callable[[str, float], None] | None = None) -> Check:
     """Check the header of a recording against the flights in it, and against the frames in which the body is at rest.
 
     Args:
         recording: The recording, an argument of `load_log`, or the flights found in a recording.
+        on_progress: Called with a description of the current work and the fraction of the flights that is done.
 
     Returns:
         The measured values with their intervals, the findings, and the properties of each toss.
@@ -110,7 +112,7 @@ def log_check(recording: Flights | Log | str | Path) -> Check:
     log = load_log(recording) if isinstance(recording, str | Path) else recording
     if isinstance(log, Log):
         try:
-            flights = flights_in_any_units(log, ALARM)
+            flights = flights_in_any_units(log, ALARM, on_progress or ignore)
         except DropspinError:
             other = _in_another_reading(log)
             if other is None:

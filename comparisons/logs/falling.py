@@ -1,6 +1,7 @@
 """The flights of a recording whose units and axes may be wrong: tosses fall longest with one acceleration, in whatever direction."""
 
 import math
+from collections.abc import Callable
 from functools import cache
 from itertools import product
 
@@ -10,6 +11,7 @@ from dropspin.comparisons.logs.flight import ACCELERATION, accelerations, is_nea
 from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, flights_of, heights
 from dropspin.comparisons.logs.header import LENGTHS, TIMES
 from dropspin.comparisons.logs.log import Log
+from dropspin.comparisons.running.inputs import ignore
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.state import Array
 
@@ -21,15 +23,17 @@ RATES = (0.5, 2.0)
 """Rates over the true one that are tried."""
 
 
-def flights_in_any_units(log: Log, alarm: float) -> Flights:
+def flights_in_any_units(log: Log, alarm: float, report: Callable[[str, float], None] = ignore) -> Flights:
     """The flights of a recording, of whatever acceleration; `alarm` is the probability with which errors may look like one.
+
+    `report` is that of `flights_of`.
 
     Raises:
         DropspinError: There is none.
     """
     down = log.header.acceleration
     acceleration = _acceleration(log, down)
-    flights = flights_of(log, acceleration)
+    flights = flights_of(log, acceleration, report)
     if flights is None or (acceleration is not down and not _flies(flights, alarm)):
         needed = max(window_size(toss, noise_of(log), down) for toss in log.tosses)
         raise DropspinError(

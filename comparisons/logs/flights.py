@@ -1,6 +1,6 @@
 """All flights of a recording: what they share, and the state at the end of each."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -12,6 +12,7 @@ from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.log import Log, Toss
 from dropspin.comparisons.logs.noise import Noise, Regression, end_of, regression
 from dropspin.comparisons.logs.rotors import Rotation, misread, rotation, turn_by
+from dropspin.comparisons.running.inputs import ignore
 from dropspin.scenarios.ensemble import clearances
 from dropspin.scenarios.rotations import multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
@@ -129,8 +130,11 @@ def _start(flight: Flight, known: Array, rotor: Rotation, position_noise: Noise,
     return Start(flight.toss, flight.first, int(flight.rows[-1]), state, covariance)
 
 
-def flights_of(log: Log, acceleration: Array) -> Flights | None:
-    """The flights of a recording whose free acceleration is about a given one [m/s²], shape (3,); None if no toss has one."""
+def flights_of(log: Log, acceleration: Array, report: Callable[[str, float], None] = ignore) -> Flights | None:
+    """The flights of a recording whose free acceleration is about a given one [m/s²], shape (3,); None if no toss has one.
+
+    `report` is called with a description of the work and the fraction of it that is done.
+    """
     flights = _above_floor(log.header, falls(log, acceleration))
     for _ in range(2):
         found = [flight for flight in flights if flight is not None]
@@ -140,10 +144,19 @@ def flights_of(log: Log, acceleration: Array) -> Flights | None:
         weights = iter(moving.weights)
         flights = [None if flight is None else grown(flight, moving, next(weights)) for flight in flights]
     inertia = log.header.body.inertia_tensor
-    rotors = [None if flight is None else _sound(rotation(flight, inertia)) for flight in flights]
-    rotations = tuple(rotor for rotor in rotors if rotor is not None)
+    rotors = iter([_sound(rotor) for rotor in _rotors([flight for flight in flights if flight is not None], inertia, report)])
+    by_toss = [None if flight is None else next(rotors) for flight in flights]
+    rotations = tuple(rotor for rotor in by_toss if rotor is not None)
     moving = regression([positions(rotor.flight) for rotor in rotations])
-    return Flights(log, tuple(None if rotor is None else rotor.flight for rotor in rotors), moving, rotations, _turning(rotations))
+    flown = tuple(None if rotor is None else rotor.flight for rotor in by_toss)
+    return Flights(log, flown, moving, rotations, _turning(rotations, report))
+
+
+def _rotors(flights: Sequence[Flight], inertia: Array, report: Callable[[str, float], None], done: float = 0.0) -> Iterator[Rotation]:
+    """The rotor of each flight; the first ones take half of the work that is not done, because further ones may follow."""
+    for number, flight in enumerate(flights, 1):
+        yield rotation(flight, inertia)
+        report(f"rotation of {number} of {len(flights)} flights", done + 0.5 * (1.0 - done) * number / len(flights))
 
 
 def _sound(rotor: Rotation) -> Rotation:
@@ -152,17 +165,18 @@ def _sound(rotor: Rotation) -> Rotation:
     return rotation(replace(rotor.flight, misread=wrong), rotor.inertia) if wrong else rotor
 
 
-def _turning(rotations: Sequence[Rotation]) -> Regression:
+def _turning(rotations: Sequence[Rotation], report: Callable[[str, float], None]) -> Regression:
     """Ratios of inertia, by derivatives at those that the flights show, if these are not those of the rotors."""
     turning, moved = regression([rotor.samples for rotor in rotations]), np.zeros(2)
-    for _ in range(ROUNDS):
+    for number in range(1, ROUNDS + 1):
         is_off = np.abs(turning.values) > turning.half_widths(SURELY)
         moved += np.where(is_off, np.clip(turning.values, -LARGEST_STEP, LARGEST_STEP), 0.0)
         if not is_off.any():
             break
         stretched = np.exp(0.5 * np.array([moved[0], 0.0, moved[1]]))
         inertia = rotations[0].inertia * np.outer(stretched, stretched)
-        turning = regression([rotation(rotor.flight, inertia).samples for rotor in rotations])
+        rotors = _rotors([rotor.flight for rotor in rotations], inertia, report, 1.0 - 0.5**number)
+        turning = regression([rotor.samples for rotor in rotors])
     return replace(turning, values=turning.values + moved)
 
 

@@ -26,10 +26,12 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
     from dropspin.comparisons.logs.continued_tosses import measured_scene
     from dropspin.reports.stories.log_check import CheckedLog
     from dropspin.reports.study_files import write_scenes, write_toml, written_study
+    from dropspin.reports.terminal.progress import share_bar
     from dropspin.scenarios import DropspinError
 
     with written_study(output, json_output, has_report=True) as keep:
-        check = log_check(recording)
+        with share_bar(recording) as on_progress:
+            check = log_check(recording, on_progress)
         folder = keep(CheckedLog.of(recording, check))
         write_toml(check.corrected.model_dump(mode="json", exclude_none=True), folder / "corrected.toml")
         can_continue = check.reads_the_columns_right and check.flights.log.header.floor is not None

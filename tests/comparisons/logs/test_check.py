@@ -366,7 +366,7 @@ def test_header_that_is_wrong_in_a_way_that_lets_no_point_fly_is_corrected(keys:
 
 def test_another_reading_is_not_searched_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two readings of which each is the best of the other would be tried in turn without end."""
-    monkeypatch.setattr(checks, "flights_in_any_units", lambda log, alarm: (_ for _ in ()).throw(DropspinError("no toss has a flight")))
+    monkeypatch.setattr(checks, "flights_in_any_units", lambda *given: (_ for _ in ()).throw(DropspinError("no toss has a flight")))
     log = sound(count=4)
     wrong = replace(log, header=log.header.model_copy(update={"length_unit": "mm"}))
     assert log_check(changed(wrong, position=lambda toss: 1e-3 * toss.position)).corrected == log.header

@@ -9,7 +9,7 @@ from dropspin.comparisons.faults.conventions import CONVENTIONS
 from dropspin.comparisons.faults.fault_model import FaultModel, Simulated, changed_table
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box, Ellipsoid
-from dropspin.scenarios.bodies.inertia import principal_axes
+from dropspin.scenarios.bodies.inertia import in_numbers, principal_axes
 from dropspin.scenarios.model import Gravity
 from dropspin.scenarios.state import UP, Array
 from dropspin.scenarios.variations import with_values
@@ -38,7 +38,11 @@ def _angular_like_linear(scene: Scenario) -> Scenario:
 
 def _scaled_inertia(by: Callable[[float], float]) -> Simulated:
     """Moments of inertia times a function of the mass."""
-    return lambda scene: with_values(scene, "body", inertia=tuple(by(scene.body.mass) * moment for moment in scene.body.moments))
+    return lambda scene: with_values(scene, "body", inertia=in_numbers(by(scene.body.mass) * scene.body.inertia_tensor))
+
+
+def _without_products(scene: Scenario) -> Scenario:
+    return with_values(scene, "body", inertia=scene.body.moments)
 
 
 def _permuted_moments(order: tuple[int, ...]) -> Simulated:
@@ -69,7 +73,7 @@ def _permuted_extents(order: tuple[int, ...]) -> Simulated:
         if not isinstance(scene.body, Box | Ellipsoid):
             return scene
         extents = [scene.body.half_extents[axis] for axis in order]
-        return with_values(scene, "body", half_extents=extents, inertia=scene.body.moments)
+        return with_values(scene, "body", half_extents=extents, inertia=in_numbers(scene.body.inertia_tensor))
 
     return permuted
 
@@ -81,7 +85,7 @@ def _scaled(size: str, by: float) -> Simulated:
         if scene.floor is None or size not in type(scene.body).model_fields:
             return scene
         larger = {size: lambda values: np.multiply(values, by).tolist()}
-        return with_values(scene, "body", inertia=scene.body.moments, **larger)
+        return with_values(scene, "body", inertia=in_numbers(scene.body.inertia_tensor), **larger)
 
     return scaled
 
@@ -113,7 +117,7 @@ PARAMETERS: dict[str, dict[str, Simulated]] = {
     "inertia": {
         "angular velocity stays constant, as without the gyroscopic term or with the inertia of a ball": _as_a_ball,
         **{f"the moments of inertia appear to be permuted to ({named})": _permuted_moments(order) for order, named in ORDERS.items()},
-        "products of inertia are omitted: the body's own axes are not principal axes": _scaled_inertia(lambda mass: 1.0),
+        "products of inertia are omitted: the body's own axes are not principal axes": _without_products,
         "inertia is twice as large, relative to the mass": _scaled_inertia(lambda mass: 2.0),
         "inertia is half as large, relative to the mass": _scaled_inertia(lambda mass: 0.5),
         "inertia is multiplied by the mass": _scaled_inertia(lambda mass: mass),

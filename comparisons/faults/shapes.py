@@ -14,6 +14,7 @@ from pydantic import TypeAdapter
 from dropspin.comparisons.faults.fault_model import FaultModel, Reported, Simulated, changed_part, changed_start
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.bodies import Body, Capsule, Cylinder, Ellipsoid, Mesh, OnAxis, Shape
+from dropspin.scenarios.bodies.inertia import in_numbers
 from dropspin.scenarios.rotations import about, conjugate, multiply
 from dropspin.scenarios.state import ORIENTATION, Array
 from dropspin.scenarios.variations import with_values
@@ -87,7 +88,8 @@ def _along(number: int) -> Iterator[FaultModel]:
     def simulated(scene: Scenario, order: NDArray[np.intp]) -> Scenario:
         if not isinstance(scene.body, OnAxis):
             raise DropspinError(f"a {scene.body.shape} has no axis of its own")
-        return changed_start(_turned(turn))(with_values(scene, "body", inertia=np.array(scene.body.moments)[order].tolist()))
+        inertia = in_numbers(scene.body.inertia_tensor[np.ix_(order, order)])
+        return changed_start(_turned(turn))(with_values(scene, "body", inertia=inertia))
 
     message = f"the axis of a capsule or a cylinder appears to be {'xyz'[number]}; it is y"
     for moments in (order, np.arange(3)):

@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,7 @@ from dropspin.comparisons.logs.other_readings import in_other_readings, of_lengt
 from dropspin.comparisons.logs.recording_faults import of_floor, of_frames, of_rates
 from dropspin.comparisons.logs.rest import rests
 from dropspin.comparisons.running.inputs import ignore
-from dropspin.scenarios.bodies.inertia import is_diagonal
+from dropspin.scenarios.bodies.inertia import in_numbers
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import unrotate
 from dropspin.scenarios.state import UP, Array
@@ -223,7 +222,7 @@ def _of_offset(flights: Flights, values: Sequence[Value]) -> Iterator[Finding]:
         seen, allowed = np.isfinite(moved) & is_off, 4.0 * error + 0.2 * np.abs(off)
         # δ is the error of the tracked point: 0 if the centre of mass is the cause, -off if the point is.
         by_mass, by_point = (bool(seen.any() and (np.abs(moved - wrong) < allowed)[seen].all()) for wrong in (0.0, -off))
-        inertia = {} if isinstance(header.body.inertia, tuple) else {"body.inertia": _moments(header.body.inertia_tensor)}
+        inertia = {} if isinstance(header.body.inertia, tuple) else {"body.inertia": in_numbers(header.body.inertia_tensor)}
         keys = {"body.center_of_mass": _rounded(header.body.centre + off)} | inertia
         point = {"tracked_point": _rounded(np.asarray(header.tracked_point) - off)}
         causes = _shown((Cause("centre of mass", keys=keys), by_mass), (Cause("tracked point", keys=point), by_point))
@@ -235,18 +234,13 @@ def _rounded(values: Array) -> list[float]:
     return [round(value, 4) for value in values.tolist()]
 
 
-def _moments(inertia: Array) -> list[Any]:
-    """A tensor of inertia as a header has it: three moments, or rows."""
-    return list((np.diag(inertia) if is_diagonal(inertia) else inertia).tolist())
-
-
 def _of_inertia(flights: Flights, drag: Regression, values: Sequence[Value]) -> Iterator[Finding]:
     """Of ratios of moments of inertia that differ from the header's, and of drag, as far as they are identifiable."""
     found, body = flights.turning, flights.log.header.body
     known = _known(values, RATIOS)
     ratios = np.where(known, found.values, 0.0)
     stretched = np.exp(0.5 * np.array([ratios[0], 0.0, ratios[1]]))
-    keys = {"body.inertia": _moments(body.inertia_tensor * np.outer(stretched, stretched))}
+    keys = {"body.inertia": in_numbers(body.inertia_tensor * np.outer(stretched, stretched))}
     wide = found.half_widths(ALARM)
     orders = tuple(_orders_that_fit(flights.log, ratios, np.where(known, wide, np.inf)))
     causes = (*orders, Cause("other moments" if orders else "moments of inertia", keys=keys))

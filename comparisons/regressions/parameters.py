@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from dropspin.scenarios import DropspinError, Scenario
-from dropspin.scenarios.bodies.inertia import is_diagonal
+from dropspin.scenarios.bodies.inertia import in_numbers, is_diagonal
 from dropspin.scenarios.damping import Damping
 from dropspin.scenarios.rotations import about, rotate
 from dropspin.scenarios.state import Array
@@ -53,7 +53,7 @@ def _added_damping(which: str) -> Change:
 
 
 def _mass(scene: Scenario, share: float) -> Scenario:
-    return with_values(scene, "body", mass=lambda mass: (1.0 + share) * mass, inertia=scene.body.moments)
+    return with_values(scene, "body", mass=lambda mass: (1.0 + share) * mass, inertia=in_numbers(scene.body.inertia_tensor))
 
 
 def _moments(*wrong: int) -> Change:

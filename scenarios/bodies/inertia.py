@@ -68,6 +68,11 @@ def tensor(moments: tuple[Any, ...]) -> Array:
     return np.diag(array) if array.ndim == 1 else array
 
 
+def in_numbers(tensor: Array) -> list[Any]:
+    """A tensor as a table has it: three moments, or its rows if it has products of inertia."""
+    return list((np.diag(tensor) if is_diagonal(tensor) else tensor).tolist())
+
+
 def second_moments(points: Array, masses: Array | float) -> Array:
     """Σ m x xᵀ of masses [kg] at points [m], shape (3, 3).
 

@@ -11,7 +11,8 @@ Valid for: a ball on a frictionless floor, with any spin and any horizontal moti
 where it can lie, such as a capsule on its side, on a frictionless floor, with any horizontal motion and with spin only about the vertical,
 up to rounding; each of these on any floor, if it has no spin and no horizontal motion; gravity straight down, no damping. A body that lands
 has the mean of its lowest points under its centre of mass; one that rests has its centre of mass above the inside of its base. Valid until
-a difference of one eps in a spin about the intermediate axis can turn the body over.
+a difference of one eps in a spin about the intermediate axis can turn the body over, or, of a body that lands on one point of a curved
+surface, until its impacts have amplified a small tilt as much as `corner_impact` allows.
 """
 
 import math
@@ -22,6 +23,7 @@ from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.surfaces import Floor
+from dropspin.scenarios.truths.corner_impact import TOO_SENSITIVE, corner_impact
 from dropspin.scenarios.truths.flight import TURNS_OVER, flight_states
 from dropspin.scenarios.truths.truth import Truth, impacts_of, piece
 
@@ -66,7 +68,10 @@ def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
         rows[:, 8] = speed - pull * since
         return rows
 
-    until = min(scene.duration, sideways_and_spin.horizon)
+    until, ends = min(scene.duration, sideways_and_spin.horizon), TURNS_OVER
+    tilted = corner_impact(scene, floor) if _lands_on_a_point(scene) and len(leaving) else None
+    if tilted is not None and tilted.ends == TOO_SENSITIVE and tilted.horizon < until:
+        until, ends = tilted.horizon, TOO_SENSITIVE
     times = starts[1:][starts[1:] <= until]
     before, after = states(times), states(times)
     before[:, 1] = after[:, 1] = floor_height
@@ -78,7 +83,13 @@ def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
     if u0 == 0.0:
         stays = "slides on the floor at a constant velocity" if start[7] or start[9] else "rests on the floor"
         statement = f"the body {stays} and turns about the vertical at the constant angular velocity ω, by the angle ω t"
-    return Truth("bounce-ladder", statement, states, impacts_of(times, before, after), until, TURNS_OVER if until < scene.duration else "")
+    return Truth("bounce-ladder", statement, states, impacts_of(times, before, after), until, ends if until < scene.duration else "")
+
+
+def _lands_on_a_point(scene: Scenario) -> bool:
+    """Whether the body is round, no ball, and has one lowest point."""
+    is_round = bool(scene.body.semi_axes.any()) and not scene.body.is_ball
+    return is_round and len(scene.body.lowest(np.array(scene.start.orientation), 1e-12)) == 1
 
 
 def _leaving_speeds(u0: float, g: float, floor: Floor, remaining: float) -> Array | None:

@@ -88,7 +88,8 @@ def rolling(scene: Scenario, floor: Floor) -> Truth | None:
 
 def _ball(scene: Scenario) -> tuple[float, float] | None:
     """The radius of a ball of equal moments, and its moment of inertia."""
-    return (scene.body.size, scene.body.moments[0]) if scene.body.is_ball and len(set(scene.body.moments)) == 1 else None
+    moments = np.linalg.eigvalsh(scene.body.inertia_tensor)
+    return (scene.body.size, float(moments[0])) if scene.body.is_ball and float(np.ptp(moments)) == 0.0 else None
 
 
 def _on_its_side(scene: Scenario, along: Sequence[Array]) -> tuple[float, float] | None:

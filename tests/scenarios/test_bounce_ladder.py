@@ -210,3 +210,27 @@ def test_a_leaning_prism_rests_only_with_its_centre_of_mass_above_its_base(lean,
     scene = load({"duration": 1.0, "body": body, "start": {"position": [0.0, 0.1, 0.0]}, "gravity": gravity, "floor": floor})
     truth = truth_for(scene)
     assert (truth is not None and truth.name == "bounce-ladder") == rests
+
+
+@pytest.mark.parametrize(("half_extents", "impacts"), [([0.3, 0.2, 0.1], 2), ([0.1, 0.1, 0.1], 11)])
+def test_a_ladder_ends_where_impacts_have_amplified_a_tilt_of_a_curved_body(half_extents, impacts):
+    """A tilt φ moves the lowest point by (ρ - h) φ, with ρ the radius of curvature, so that an impact turns the body on.
+
+    dω = -M (1 + e) u (ρ - h) φ / I for an impact at the speed u. A sphere has ρ = h.
+    """
+    a, _, h = half_extents
+    body = {"shape": "ellipsoid", "half_extents": half_extents, "mass": 1.0}
+    start = {"position": [0.0, 1.0 + h, 0.0], "orientation": list(about(np.array([1.0, 0.0, 0.0]), np.asarray(np.pi / 2)))}
+    floor, gravity = {"restitution": 0.9, "friction": "none"}, {"acceleration": [0.0, -9.8, 0.0]}
+    truth = truth_for(load({"duration": 6.0, "body": body, "start": start, "gravity": gravity, "floor": floor}))
+    assert (truth.name, len(truth.events)) == ("bounce-ladder", impacts)
+    u, tilt, rate, growth = math.sqrt(2.0 * 9.8), 0.0, 1.0, []
+    t = u / 9.8
+    for _ in range(impacts):
+        tilt += rate * t
+        rate -= 1.9 * u * (a**2 / h - h) * tilt / (0.2 * (a**2 + h**2))
+        u *= 0.9
+        t = 2.0 * u / 9.8
+        growth.append(abs(rate))
+    assert (growth[-1] > 1e4) == (truth.horizon < 6.0)
+    assert all(one < 1e4 for one in growth[:-1])

@@ -133,6 +133,9 @@ def test_orientation_is_continuous_where_rolling_begins():
     [
         thrown(friction="infinite"),  # an impulse would stop its slip at once
         thrown(inertia=(0.01, 0.012, 0.01)),
+        thrown(
+            inertia=((0.01, 0.002, 0.001), (0.002, 0.01, 0.0), (0.001, 0.0, 0.01))
+        ),  # equal about the body's axes, not in all directions
         thrown(height=0.2),
         thrown(velocity=(1.0, 0.5, 0.0)),
         thrown(damping={"linear": 0.1}),

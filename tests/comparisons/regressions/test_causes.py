@@ -8,6 +8,7 @@ from support.fault_suite import FAULTS as PLANTED
 from support.fault_suite import Made, with_body, with_damping, with_gravity, with_restitution
 from support.releases import TODAY, WithoutGyroscopicTerm, relabelled
 
+from dropspin.comparisons.faults import parameters as mistakes
 from dropspin.comparisons.regressions.baseline import Baseline
 from dropspin.comparisons.regressions.causes import causes
 from dropspin.comparisons.regressions.checking import accept, check
@@ -193,3 +194,18 @@ def test_moments_that_no_body_has_explain_no_error():
     with pytest.raises(DropspinError, match="no body has the moments of inertia"):
         about_y.change(plate, 0.01)
     assert about_y.change(plate, -0.01).body.inertia_tensor[1, 1] == pytest.approx(0.99 * plate.body.inertia_tensor[1, 1])
+
+
+def test_changes_of_mass_and_of_size_keep_the_products_of_inertia():
+    inertia = ((0.004, 0.001, 0.0005), (0.001, 0.004, 0.0008), (0.0005, 0.0008, 0.004))
+    box = {"shape": "box", "half_extents": [0.1, 0.08, 0.06], "mass": 1.0, "inertia": inertia}
+    start, floor = {"position": [0.0, 1.0, 0.0]}, {"restitution": 0.5, "friction": "none"}
+    scene = load({"duration": 1.0, "body": box, "start": start, "floor": floor, "gravity": {"acceleration": [0.0, -9.8, 0.0]}})
+    [mass] = [one for one in PARAMETERS if one.name == "mass"]
+    np.testing.assert_array_equal(mass.change(scene, 0.1).body.inertia_tensor, inertia)
+    of_faults = mistakes.PARAMETERS["inertia"]
+    np.testing.assert_array_equal(
+        of_faults["inertia is twice as large, relative to the mass"](scene).body.inertia_tensor, 2.0 * np.array(inertia)
+    )
+    [without] = [change for words, change in of_faults.items() if words.startswith("products of inertia are omitted")]
+    np.testing.assert_array_equal(without(scene).body.inertia_tensor, 0.004 * np.eye(3))

@@ -12,7 +12,7 @@ where it can lie, such as a capsule on its side, on a frictionless floor, with a
 up to rounding; each of these on any floor, if it has no spin and no horizontal motion; gravity straight down, no damping. A body that lands
 has the mean of its lowest points under its centre of mass; one that rests has its centre of mass above the inside of its base. Valid until
 a difference of one eps in a spin about the intermediate axis can turn the body over, or, of a body that lands on one point of a curved
-surface, until its impacts have amplified a small tilt as much as `corner_impact` allows.
+surface, until its impacts, or its spin at rest, have amplified small differences too much.
 """
 
 import math
@@ -21,10 +21,11 @@ import numpy as np
 
 from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
-from dropspin.scenarios.state import Array
+from dropspin.scenarios.state import SPIN, Array
 from dropspin.scenarios.surfaces import Floor
-from dropspin.scenarios.truths.corner_impact import TOO_SENSITIVE, corner_impact
+from dropspin.scenarios.truths.corner_impact import MAX_GROWTH, TOO_SENSITIVE, corner_impact
 from dropspin.scenarios.truths.flight import TURNS_OVER, flight_states
+from dropspin.scenarios.truths.point_contact import GROWS, growth_of_a_spin
 from dropspin.scenarios.truths.truth import Truth, impacts_of, piece
 
 MAX_BOUNCES = 100_000
@@ -72,6 +73,12 @@ def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
     tilted = corner_impact(scene, floor) if _lands_on_a_point(scene) and len(leaving) else None
     if tilted is not None and tilted.ends == TOO_SENSITIVE and tilted.horizon < until:
         until, ends = tilted.horizon, TOO_SENSITIVE
+    rest = float(starts[-1])
+    if rest < until and start[SPIN].any() and _lands_on_a_point(scene):
+        at_rest = states(np.array([rest]))[0]
+        at_rest[8] = 0.0
+        growth = growth_of_a_spin(scene.starting_at(at_rest))
+        until, ends = min((until, ends), (rest + math.log(MAX_GROWTH) / growth if growth else until, GROWS))
     times = starts[1:][starts[1:] <= until]
     before, after = states(times), states(times)
     before[:, 1] = after[:, 1] = floor_height

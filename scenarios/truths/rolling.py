@@ -14,8 +14,9 @@ constant; else the orientation is integrated numerically.
 Source: G. G. de Coriolis, Théorie mathématique des effets du jeu de billard (1835); `dry_friction` for the velocity of the contact point.
 Valid for: a ball of equal moments that touches the floor at the start, with any velocity along the floor and any spin; a capsule, a
 cylinder or an ellipsoid with two equal shorter axes on its side, if its axis is principal, velocity and slope are across it, and the spin
-is about it; any friction, but infinite friction only without slip; gravity into the floor, which may be sloped, no damping. Restitution
-has no effect, because the contact does not separate.
+is about it, and if the other moments of an ellipsoid are equal: about an axis of the middle moment it does not roll stably; any friction,
+but infinite friction only without slip; gravity into the floor, which may be sloped, no damping. Restitution has no effect, because the
+contact does not separate.
 """
 
 import math
@@ -95,15 +96,18 @@ def _ball(scene: Scenario) -> tuple[float, float] | None:
 def _on_its_side(scene: Scenario, along: Sequence[Array]) -> tuple[float, float] | None:
     """The radius of a body of revolution that lies on its side, and its moment of inertia; None if it does not roll straight.
 
-    It rolls straight if its axis is a principal axis, the spin is about this axis, and velocity and slope are perpendicular to it.
+    It rolls straight if its axis is a principal axis, the spin is about this axis, and velocity and slope are perpendicular to it. On one
+    point, it has to be stable: the moments across the axis are equal.
     """
     body, orientation, spin = scene.body, np.array(scene.start.orientation), np.array(scene.start.angular_velocity)
     number = _axis_of_revolution(body)
     if number is None:
         return None
     axis, inertia = rotate(orientation, np.eye(3)[number]), body.inertia_tensor[number]
+    across = np.delete(np.delete(body.inertia_tensor, number, axis=0), number, axis=1)
     keeps = (
-        abs(axis[1]) <= ACROSS
+        (len(body.vertices) > 1 or float(np.ptp(np.linalg.eigvalsh(across))) <= ACROSS * inertia[number])
+        and abs(axis[1]) <= ACROSS
         and np.abs(np.delete(inertia, number)).max() <= ACROSS * inertia[number]
         and np.linalg.norm(np.cross(spin, axis)) <= ACROSS * np.linalg.norm(spin)
         and all(abs(vector @ axis) <= ACROSS * np.linalg.norm(vector) for vector in along)

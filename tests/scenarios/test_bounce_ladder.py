@@ -234,3 +234,31 @@ def test_a_ladder_ends_where_impacts_have_amplified_a_tilt_of_a_curved_body(half
         growth.append(abs(rate))
     assert (growth[-1] > 1e4) == (truth.horizon < 6.0)
     assert all(one < 1e4 for one in growth[:-1])
+
+
+def test_a_spin_on_the_point_of_an_ellipsoid_is_known_until_it_is_unstable():
+    """Small turns φ, χ about the level axes of the body, of moments A and B, with C about the vertical and k = M g (ρ - h) for each.
+
+    A φ'' = (A + B - C) ω χ' - (k_a + (C - B) ω²) φ,  B χ'' = -(A + B - C) ω φ' - (k_b + (C - A) ω²) χ
+    """
+    A, C, B = inertia = (0.0085, 0.001, 0.008)
+    body = {"shape": "ellipsoid", "half_extents": [0.3, 0.1, 0.2], "mass": 1.0, "inertia": inertia}
+    for spin, height in ((27.0, 0.1), (27.0, 0.3), (5.0, 0.1)):
+        start = {"position": [0.0, height, 0.0], "angular_velocity": [0.0, spin, 0.0]}
+        floor, gravity = {"restitution": 0.0, "friction": "none"}, {"acceleration": [0.0, -9.8, 0.0]}
+        truth = truth_for(load({"duration": 10.0, "body": body, "start": start, "gravity": gravity, "floor": floor}))
+        k_a, k_b = 9.8 * (0.2**2 / 0.1 - 0.1), 9.8 * (0.3**2 / 0.1 - 0.1)
+        turning = (A + B - C) * spin
+        p, q = k_a + (C - B) * spin**2, k_b + (C - A) * spin**2
+        squares = np.roots([A * B, A * q + B * p + turning**2, p * q])  # of the rates λ
+        growth = float(np.sqrt(squares.astype(complex)).real.max())
+        rest = math.sqrt(2.0 * (height - 0.1) / 9.8)
+        assert truth.name == "bounce-ladder"
+        assert truth.horizon == pytest.approx(min(10.0, rest + math.log(1e4) / growth) if growth > 1e-6 else 10.0, rel=1e-6)
+
+
+def test_a_spin_of_a_solid_ellipsoid_about_its_shortest_axis_is_stable():
+    body = {"shape": "ellipsoid", "half_extents": [0.3, 0.1, 0.2], "mass": 1.0}
+    start = {"position": [0.0, 0.1, 0.0], "angular_velocity": [0.0, 27.0, 0.0]}
+    floor, gravity = {"restitution": 0.0, "friction": "none"}, {"acceleration": [0.0, -9.8, 0.0]}
+    assert truth_for(load({"duration": 10.0, "body": body, "start": start, "gravity": gravity, "floor": floor})).horizon == 10.0

@@ -37,7 +37,7 @@ from dropspin.comparisons.results.table import Measurement, as_table
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.validation import validated
 
-VERDICTS: dict[str, Verdict] = {"same": "passed", "better": "passed", "worse": "failed", "moved": "failed"}
+VERDICTS: dict[str, Verdict] = {"same": "passed", "better": "passed", "lower": "passed", "worse": "failed", "moved": "failed"}
 LOST = ("gone", "undefined")
 ACCEPTED = {"order": "accepted order", "asymptotic_error": "accepted asymptotic error", "ensemble": "accepted mean"}
 """The column `truth` of a row of kind `baseline`; `accepted` for all others."""
@@ -84,7 +84,8 @@ def accept(
 
     Returns:
         The new baseline, and a table of the differences from the earlier one. The table has a row for each result, with `value` and
-        `before` in `unit`, and the `change`: new, worse, moved, better, same, gone or undefined.
+        `before` in `unit`, and the `change`: new, worse, moved, better, lower, same, gone or undefined. Results of other engines or time
+        steps in a scene whose definition has changed are among those that are gone.
 
     Raises:
         DropspinError: The run was made with `quick`, or the reason is empty or has several lines.
@@ -96,9 +97,9 @@ def accept(
     found = changes(comparable, measured)
     lost = found["change"].isin(LOST) & broke_down(found, results)
     kept = comparable.merge(found.loc[(found["change"] == "same") | lost, KEY], on=KEY)
-    if known_failures:
-        flags = kept[KEY].merge(measured[[*KEY, "known_failure"]], on=KEY, how="left")["known_failure"]
-        kept["known_failure"] = flags.where(flags.notna(), kept["known_failure"]).astype(bool)
+    now = kept[KEY].merge(measured[[*KEY, "verdict", "known_failure"]], on=KEY, how="left")
+    flags = now["known_failure"].eq(True) | ((now["verdict"] == "failed") & kept["known_failure"])
+    kept["known_failure"] = np.where(now["verdict"].isna(), kept["known_failure"], flags)
     stamp = results.provenance
     adapters = {engine: code for engine, code in stamp["adapters"].items() if code is not None and (measured["engine"] == engine).any()}
     settings = {engine: common_settings(stamp, engine) for engine in adapters}
@@ -106,7 +107,8 @@ def accept(
     acceptance = validated(Acceptance, "accept", content | {"adapters": adapters, "settings": settings})
     moved = measured[~_keys(measured).isin(_keys(kept))].assign(by=acceptance.key)
     outside = earlier.results.drop(covered.index)
-    table = pd.concat([outside[~_has_other_scene(outside, earlier, results)], kept, moved], ignore_index=True)[list(COLUMNS)]
+    is_of_another_scene = _has_other_scene(outside, earlier, results)
+    table = pd.concat([outside[~is_of_another_scene], kept, moved], ignore_index=True)[list(COLUMNS)]
     every = {acceptance.key: acceptance, **earlier.acceptances}
     accepted = Baseline(
         {key: one for key, one in every.items() if key in set(table["by"])},
@@ -115,7 +117,8 @@ def accept(
         {**earlier.motions, acceptance.key: {**earlier.motions.get(acceptance.key, {}), **digests_of(stamp)}},
         table,
     )
-    return accepted, found[~lost]
+    removed = changes(outside[is_of_another_scene], measured.iloc[:0])
+    return accepted, pd.concat([found[~lost], removed], ignore_index=True)
 
 
 def check(results: Results, baseline: Baseline | str | Path | None = None) -> Checked:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pandas as pd
 
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES
-from dropspin.comparisons.regressions.changes import broke_down, comparable_results, regressed
+from dropspin.comparisons.regressions.changes import asked_for, broke_down, comparable_results, regressed
 from dropspin.comparisons.regressions.checking import Checked
 from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
@@ -91,7 +91,7 @@ def not_covered(checked: Checked) -> str:
 def _verdict(checked: Checked, failed_rows: pd.DataFrame, verdict: str) -> str:
     """The last sentence: the verdict on the accepted results and on the other checks of the run."""
     failed = len(regressed(checked.changes))
-    judged = int(checked.changes["change"].isin(["same", "better"]).sum()) + failed
+    judged = int(checked.changes["change"].isin(["same", "better", "lower"]).sum()) + failed
     changed = failed_rows.loc[failed_rows["basis"] == "scene_changed", "scene"].nunique()
     scenes = f"{counted(changed, 'scene has', 'scenes have')} changed since results were accepted. " if changed else ""
     if failed or changed:
@@ -104,9 +104,16 @@ def _verdict(checked: Checked, failed_rows: pd.DataFrame, verdict: str) -> str:
 def accepted_sentences(results: Results, accepted: pd.DataFrame, known_failures: bool) -> list[str]:
     """Sentences on how many results of a run were accepted, and which cannot be accepted."""
     changed = accepted["change"].value_counts()
-    kinds = [f"{changed[kind]:,} {kind}" for kind in ("new", "worse", "moved", "better", "gone", "undefined", "same") if kind in changed]
+    kinds = [
+        f"{changed[kind]:,} {kind}" for kind in ("new", "worse", "moved", "better", "lower", "gone", "undefined", "same") if kind in changed
+    ]
     measured = ", ".join(engine for engine in results.engines if (accepted["engine"] == engine).any())
     notes = [f"Accepted for {counted(len(results.scenes), 'scene')} with {measured}: {', '.join(kinds) or 'no results'}."]
+    removed = accepted.drop(asked_for(accepted, results).index).query("change in ['gone', 'undefined']")
+    if len(removed):
+        pairs = ", ".join(f"{scene} with {engine}" for scene, engine in removed[["scene", "engine"]].drop_duplicates().to_numpy())
+        are = counted(len(removed), "accepted result is", "accepted results are")
+        notes.append(f"{are} removed, because the scene has changed and this run does not cover them: {pairs}. Run and accept these too.")
     tally = counts(results)
     acceptable = int(comparable_results(results)["verdict"].isin(FAILURES).sum())
     unknown = tally.failed - acceptable

@@ -12,7 +12,7 @@ from dropspin.reports.stories.failures import reproduce_scenes
 from dropspin.reports.stories.numbers import Row, capitalized, formatted, in_ms, subject
 from dropspin.scenarios.text import counted
 
-TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "undefined": "Undefined", "new": "New"}
+TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "lower": "Lower", "undefined": "Undefined", "new": "New"}
 """The heading of each kind of change, the worst kind first."""
 MOST_LINES = 12
 """Largest number of lines of a table; JSON has all lines."""

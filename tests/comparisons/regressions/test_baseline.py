@@ -15,6 +15,7 @@ from support.releases import SCENES, TODAY, WITH_FLOOR, Broken, Candidate, Euler
 from dropspin.comparisons.regressions.baseline import Baseline, load_baseline, write_baseline
 from dropspin.comparisons.regressions.changes import KEY
 from dropspin.comparisons.regressions.checking import accept, check
+from dropspin.reports.stories.check import accepted_sentences
 from dropspin.scenarios import DropspinError
 
 
@@ -108,10 +109,16 @@ def test_results_of_engines_that_broke_down_stay(release, accepted):
 
 
 def test_results_of_a_changed_scene_are_replaced_for_every_engine(longer_fall, accepted):
-    moved, _ = accept(part(longer_fall, engines=["candidate"]), accepted, "longer", TODAY)
+    """The results of other engines in this scene are removed, and this is said."""
+    alone = part(longer_fall, engines=["candidate"])
+    moved, found = accept(alone, accepted, "longer", TODAY)
     of_scene = moved.results[moved.results["scene"] == "fall-spin"]
     assert set(of_scene["engine"]) == {"candidate"}
     assert {moved.acceptances[by].reason for by in of_scene["by"]} == {"longer"}
+    removed = accepted.results.query("scene == 'fall-spin' and engine != 'candidate'")
+    [said] = [sentence for sentence in accepted_sentences(alone, found, known_failures=False) if "removed" in sentence]
+    assert said.startswith(f"{len(removed)} accepted results are removed, because the scene has changed and this run does not cover them: ")
+    assert "fall-spin with mujoco" in said
 
 
 def with_reasons(baseline):

@@ -14,8 +14,8 @@ from support.releases import (
     DTS,
     SCENES,
     TODAY,
-    TURNING,
     WITH_FLOOR,
+    WORSE,
     Broken,
     Candidate,
     Euler,
@@ -40,8 +40,8 @@ from dropspin.comparisons.running.run import run
     ("planted", "scenes", "metrics"),
     [
         (TooLively, WITH_FLOOR, {"restitution_error"}),
-        (WithoutGyroscopicTerm, TURNING, {"orientation_error", "angular_momentum_direction_error"}),
-        (Euler, TURNING, {"orientation_error"}),
+        (WithoutGyroscopicTerm, WORSE, {"orientation_error", "angular_momentum_direction_error"}),
+        (Euler, WORSE, {"orientation_error"}),
     ],
     ids=["1 % restitution", "no gyroscopic term", "Euler instead of RK4"],
 )
@@ -54,6 +54,9 @@ def test_planted_faults_fail_and_are_listed_first(release, accepted, planted, sc
     failed = failing(checked)
     assert set(failed["scene"]) == scenes
     assert set(failed["engine"]) == {"candidate"}
+    if scenes == WORSE:
+        of_ball = checked.changes[(checked.changes["scene"] == "drop-ball-backspin") & (checked.changes["change"] != "same")]
+        assert list(of_ball.sort_values("kind")["change"]) == ["lower", "better", "better", "better"]
     assert failed["metric"].iloc[0] in metrics
     assert checked.changes["in_tolerances"].iloc[0] > 1e4
     assert checked.results.exit_code() == 1
@@ -210,6 +213,9 @@ def test_known_failures_do_not_fail_until_they_get_worse():
     assert row["reason"] == "accepted as a known failure; no contact is that stiff"
     worse = replace(found, table=found.table.assign(value=found.table["value"].where(found.table["metric"] != "penetration", 0.5)))
     assert check(worse, known).results.exit_code() == 1
+    assert accept(found, known, "again", TODAY)[0].results["known_failure"].any()
+    fixed = replace(found, table=found.table.assign(verdict=found.table["verdict"].replace("failed", "passed")))
+    assert not accept(fixed, known, "fixed", TODAY)[0].results["known_failure"].any()
     broken = relabelled(run(scene, Broken(), 2e-3), "broken", "candidate")
     crashed, lost = accept(broken, known, "a bad day", TODAY, known_failures=True)
     assert lost.empty

@@ -236,6 +236,23 @@ def test_result_worse_than_accepted_fails(repository):
     )
 
 
+@pytest.mark.usefixtures("baseline")
+def test_marked_test_of_an_engine_whose_accepted_results_are_gone_fails(repository):
+    """Although the configuration file alone names it, and it declines the scene or is not installed."""
+    repository.makeini("[pytest]\ndropspin_baseline = base.toml\ndropspin_engines = engines:Shy\n  absent:Engine")
+    base = repository.path / "base.toml"
+    base.write_text(base.read_text().replace(".mine.", ".shy.").replace(".faulty.", ".gone.") + 'engines.gone = "absent:Engine"\n')
+    repository.makepyfile(absent="import no_such_engine", test_own=SCENE_TEST)
+    done = repository.runpytest_inprocess("--dropspin-dt", "0.004")
+    done.assert_outcomes(errors=2)
+    done.stdout.fnmatch_lines(
+        [
+            "spin-principal, shy: failed: 1 accepted results are gone, declined: I do not spin",
+            "spin-principal, absent:Engine: failed: 1 accepted results are gone, missing: *",
+        ]
+    )
+
+
 @pytest.mark.extended
 @pytest.mark.usefixtures("baseline")
 def test_scene_without_accepted_results_is_judged_by_its_expectations(repository):

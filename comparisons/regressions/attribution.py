@@ -21,7 +21,7 @@ OWN_CODE = "dropspin's own code"
 OF_DROPSPIN = frozenset({"dropspin", "code"})
 """The differences of the surroundings that are dropspin's."""
 MACHINE = {"python": "Python", "cpu": "processor", "platform": "platform"}
-NO_DIFFERENCE = "no recorded property differs; the engine is not deterministic, or has changed without a new version"
+UNRECORDED = "the engine is not deterministic, or has changed without a new version"
 OWN_ENGINE = "wang"
 """The engine that is a part of dropspin."""
 CORRECTION = "a correction of dropspin, not a change of the engine"
@@ -35,7 +35,8 @@ class Attribution(NamedTuple):
             differs: the engine's version, the adapter's code, the settings. `dropspin` if its version or code differs, and the motions are
             the same in both runs or nothing else differs but the code of a built-in adapter. `surroundings` for dropspin, its code, the
             libraries and the machine. `either` if the surroundings differ and also the engine, its adapter, its settings or its motions,
-            so that the cause cannot be isolated. `nothing` if the whole provenance is the same in both runs.
+            so that the cause cannot be isolated. `nothing` if the whole provenance is the same in both runs, or all
+            that differs is excluded by an engine with the same results.
         message: The cause in a sentence, without the engine's name.
         is_correction: Whether the cause is a correction of dropspin, not a change of the engine.
     """
@@ -102,7 +103,7 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str], mot
         old: Provenance of the earlier run.
         new: Provenance of the later run.
         engine: Label of the engine whose results changed.
-        unmoved: Other engines of both runs whose results are all the same, which excludes the surroundings as the cause.
+        unmoved: Other engines of both runs whose results are all the same, which excludes libraries and machine as the cause.
         motions: Whether the engine's motions, from which these results were measured, are the same bit for bit.
     """
     absent = [word for word, stamp in (("earlier", old), ("later", new)) if not stamp["settings"].get(engine)]
@@ -114,7 +115,7 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str], mot
         corrected = ", ".join(text for part, text in around.items() if part in OF_DROPSPIN)
         return Attribution("dropspin", f"{CORRECTION}, whose motions are the same bit for bit: {corrected}", is_correction=True)
     if not own and not around:
-        return Attribution("nothing", "no recorded property and no motion differs" if motions == "same" else NO_DIFFERENCE)
+        return Attribution("nothing", f"no recorded property {'and no motion differs' if motions == 'same' else f'differs; {UNRECORDED}'}")
     if around and around.keys() <= OF_DROPSPIN and own.keys() <= ({"adapter"} if name in BUILT_IN else set()):
         if motions == "different" and name == OWN_ENGINE:
             return Attribution("dropspin", f"a change of dropspin, of which {name} is a part: {listed}")
@@ -122,14 +123,16 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str], mot
             return Attribution("either", f"{listed}; the cause cannot be isolated, because the motions of {name} differ too")
         message = f"{CORRECTION}{', as far as it is recorded' * (motions == 'unknown')}: {listed}"
         return Attribution("dropspin", message, is_correction=True)
+    others = f"but the results of {', '.join(sorted(unmoved))} are the same"
     if not own:
-        return Attribution("surroundings", f"attributed to the surroundings: {listed}")
+        possible = [text for part, text in around.items() if not unmoved or motions == "same" or part in OF_DROPSPIN]
+        if possible:
+            return Attribution("surroundings", f"attributed to the surroundings: {', '.join(possible)}")
+        return Attribution("nothing", f"no recorded property of {name} differs; {UNRECORDED}; {listed} differ, {others}")
     first = next(iter(own))
     message = f"attributed to {'the engine' if first == 'engine' else f'its {first}'}: {', '.join(own.values())}"
     if not around:
         return Attribution(first, message)
     if unmoved:
-        return Attribution(
-            first, f"{message}; {', '.join(around.values())} differ too, but the results of {', '.join(sorted(unmoved))} are the same"
-        )
+        return Attribution(first, f"{message}; {', '.join(around.values())} differ too, {others}")
     return Attribution("either", f"{listed}; the cause cannot be isolated, because the results of every engine changed")

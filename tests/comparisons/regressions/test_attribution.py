@@ -44,6 +44,14 @@ def settings(version, solref):
         ),
         ({"versions": STAMP["versions"] | {"numpy": "2.1"}}, [], "surroundings", "attributed to the surroundings: numpy 2 → 2.1"),
         (
+            {"cpu": "B"},
+            ["other"],
+            "nothing",
+            "no recorded property of candidate differs; the engine is not deterministic, or has changed without a new version; "
+            "processor A → B differ, but the results of other are the same",
+        ),
+        ({"cpu": "B", "code": "d"}, ["other"], "surroundings", "attributed to the surroundings: dropspin's own code"),
+        (
             {"cpu": "B", "adapters": {"candidate": "b"}},
             ["other"],
             "adapter",
@@ -63,6 +71,11 @@ def test_changes_are_attributed_to_what_differs(now, unmoved, origin, message):
     found = attribute(STAMP, STAMP | now, "candidate", unmoved)
     assert found.origin == origin
     assert found.message == message
+
+
+def test_library_that_measured_the_same_motions_otherwise_is_not_excluded_by_an_unmoved_engine():
+    found = attribute(STAMP, STAMP | {"versions": STAMP["versions"] | {"numpy": "2.1"}}, "candidate", ["other"], "same")
+    assert found.message == "attributed to the surroundings: numpy 2 → 2.1"
 
 
 def test_changed_code_of_a_built_in_adapter_is_a_correction_of_dropspin():

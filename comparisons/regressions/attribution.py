@@ -22,6 +22,7 @@ OF_DROPSPIN = frozenset({"dropspin", "code"})
 """The differences of the surroundings that are dropspin's."""
 MACHINE = {"python": "Python", "cpu": "processor", "platform": "platform"}
 UNRECORDED = "the engine is not deterministic, or has changed without a new version"
+OTHER_MACHINE = ", or has run on another processor, which older baselines do not record"
 OWN_ENGINE = "wang"
 """The engine that is a part of dropspin."""
 CORRECTION = "a correction of dropspin, not a change of the engine"
@@ -115,7 +116,8 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str], mot
         corrected = ", ".join(text for part, text in around.items() if part in OF_DROPSPIN)
         return Attribution("dropspin", f"{CORRECTION}, whose motions are the same bit for bit: {corrected}", is_correction=True)
     if not own and not around:
-        return Attribution("nothing", f"no recorded property {'and no motion differs' if motions == 'same' else f'differs; {UNRECORDED}'}")
+        unknown = UNRECORDED + OTHER_MACHINE * (old.get("cpu") is None and not unmoved)
+        return Attribution("nothing", f"no recorded property {'and no motion differs' if motions == 'same' else f'differs; {unknown}'}")
     if around and around.keys() <= OF_DROPSPIN and own.keys() <= ({"adapter"} if name in BUILT_IN else set()):
         if motions == "different" and name == OWN_ENGINE:
             return Attribution("dropspin", f"a change of dropspin, of which {name} is a part: {listed}")

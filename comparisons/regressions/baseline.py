@@ -57,11 +57,12 @@ HEADER = (
 
 
 class Acceptance(Table):
-    """The date, the reason and the versions of an acceptance, hashes of the code of dropspin and each adapter, settings of each engine."""
+    """The date, reason, versions and processor of an acceptance, hashes of the code of dropspin and adapters, settings of each engine."""
 
     date: datetime.date
     reason: Annotated[Text, Field(min_length=1)]
     versions: dict[Text, Text]
+    cpu: Text | None = None
     code: Text | None = None
     adapters: dict[Text, Text] = Field(default_factory=dict)
     settings: dict[Text, dict[Text, Text]] = Field(default_factory=dict)
@@ -72,7 +73,7 @@ class Acceptance(Table):
         return digest(self.model_dump())[:KEY_LENGTH]
 
     def stamp_of(self, engine: str) -> dict[str, Any]:
-        """The provenance of the accepted run, as `attribution.attribute` needs it; files of old dropspin versions have no code hashes."""
+        """The provenance of the accepted run, as `attribution.attribute` needs it; files of old dropspin versions lack some of it."""
         version = self.versions.get(engine_name(engine))
         settings = {engine: {ACCEPTED: self.settings.get(engine, {}) | ({} if version is None else {"version": version})}}
         return self.model_dump() | {"python": self.versions.get("python"), "settings": settings}

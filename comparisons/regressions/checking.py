@@ -103,7 +103,7 @@ def accept(
     stamp = results.provenance
     adapters = {engine: code for engine, code in stamp["adapters"].items() if code is not None and (measured["engine"] == engine).any()}
     settings = {engine: common_settings(stamp, engine) for engine in adapters}
-    content = {"date": date, "reason": reason, "versions": versions_behind(stamp), "code": stamp["code"]}
+    content = {"date": date, "reason": reason, "versions": versions_behind(stamp), "cpu": stamp["cpu"], "code": stamp["code"]}
     acceptance = validated(Acceptance, "accept", content | {"adapters": adapters, "settings": settings})
     moved = measured[~_keys(measured).isin(_keys(kept))].assign(by=acceptance.key)
     outside = earlier.results.drop(covered.index)

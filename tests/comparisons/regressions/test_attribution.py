@@ -3,6 +3,7 @@
 import pytest
 
 from dropspin.comparisons.regressions.attribution import ACCEPTED, CORRECTION, attribute, changed_settings
+from dropspin.comparisons.regressions.baseline import Acceptance
 
 STAMP = {
     "versions": {"dropspin": "1", "numpy": "2", "numba": "3", "scipy": "4"},
@@ -71,6 +72,26 @@ def test_changes_are_attributed_to_what_differs(now, unmoved, origin, message):
     found = attribute(STAMP, STAMP | now, "candidate", unmoved)
     assert found.origin == origin
     assert found.message == message
+
+
+@pytest.mark.parametrize(
+    ("recorded", "unmoved", "message"),
+    [
+        ({"cpu": "A"}, [], "attributed to the surroundings: processor A → B"),
+        (
+            {},
+            [],
+            "no recorded property differs; the engine is not deterministic, or has changed without a new version, "
+            "or has run on another processor, which older baselines do not record",
+        ),
+        ({}, ["other"], "no recorded property differs; the engine is not deterministic, or has changed without a new version"),
+    ],
+    ids=["known", "unknown", "excluded"],
+)
+def test_processor_of_accepted_results_is_compared_and_where_it_is_not_recorded_may_be_the_cause(recorded, unmoved, message):
+    content = {"date": "2026-03-01", "reason": "first", "versions": STAMP["versions"] | {"python": "3.11.7", "candidate": "1.0"}}
+    accepted = Acceptance.model_validate(content | {"code": "c", "adapters": STAMP["adapters"]} | recorded)
+    assert attribute(accepted.stamp_of("candidate"), STAMP | {"cpu": "B"}, "candidate", unmoved).message == message
 
 
 def test_library_that_measured_the_same_motions_otherwise_is_not_excluded_by_an_unmoved_engine():

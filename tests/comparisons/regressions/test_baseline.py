@@ -27,12 +27,13 @@ def text(accepted, tmp_path_factory):
     return path.read_text()
 
 
-def test_baseline_is_read_as_it_was_written(accepted, text, tmp_path):
-    """Value, tolerance and acceptance of each result; date, reason and versions of each acceptance."""
+def test_baseline_is_read_as_it_was_written(before, accepted, text, tmp_path):
+    """Value, tolerance and acceptance of each result; date, reason, versions and processor of each acceptance."""
     [acceptance] = tomllib.loads(text)["accepted"].values()
     assert acceptance["date"] == TODAY
     assert acceptance["reason"] == "first measured"
     assert acceptance["versions"]["candidate"] == "1.0"
+    assert acceptance["cpu"] == before.provenance["cpu"]
     assert {"dropspin", "numpy", "mujoco", "python"} <= set(acceptance["versions"])
     line = r' = \{value = [-0-9.e]+, tolerance = [0-9.e-]+, by = "[0-9a-f]{7}"\}$'
     for name in (

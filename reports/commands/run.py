@@ -17,6 +17,7 @@ from dropspin.reports.commands.options import (
     scenes_argument,
     time_limit_option,
     within_option,
+    write_text,
 )
 from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo
@@ -74,6 +75,7 @@ def run_command(
     from dropspin.comparisons.regressions.ablation import with_explaining_settings
     from dropspin.comparisons.regressions.baseline import load_baseline
     from dropspin.comparisons.regressions.checking import NothingAccepted, check
+    from dropspin.reports.junit import junit_xml
     from dropspin.reports.output import json_text
     from dropspin.reports.stories import check as story
     from dropspin.reports.stories.failures import failures
@@ -106,6 +108,8 @@ def run_command(
             if json_output:
                 echo(json_text(results.table.to_dict("records")))
             raise DropspinError(f"{baseline}: {error} The run is written: {output}.") from None
+        if baseline is not None:
+            write_text(os.path.join(output, "junit.xml"), junit_xml(checked.results, baseline).decode())
         if json_output:
             echo(json_text(checked.results.table.to_dict("records")))
         else:

@@ -77,7 +77,9 @@ def test_accepted_results_that_a_run_does_not_cover_are_named(repository, tmp_pa
     assert done.returncode == 0
     words = r"\d+ accepted results are not covered by this run: spin-principal with my-engine\."
     assert re.search(words, " ".join(done.stdout.split()))
-    complete = dropspin("check", tmp_path / "run", *BASELINE, "--complete", cwd=repository)
+    files = "--junit", tmp_path / "junit.xml", "--summary", tmp_path / "summary.md"
+    complete = dropspin("check", tmp_path / "run", *BASELINE, "--complete", *files, cwd=repository)
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]  # a file would say that all checks pass
     assert (complete.returncode, complete.stdout) == (2, done.stdout)
     assert re.search(f"{words} Run them, or leave out --complete", complete.stderr)
     assert dropspin("check", "out/good", *BASELINE, "--complete", cwd=repository).returncode == 0
@@ -126,6 +128,7 @@ def test_a_run_is_checked_at_once_with_a_baseline(release, code, verdict, reposi
     done = dropspin(*command, cwd=repository, RELEASE=release)
     assert done.returncode == code
     assert verdict in " ".join(done.stdout.split())
+    assert (ET.parse(tmp_path / "run" / "junit.xml").find(".//failure") is not None) == bool(code)
 
 
 @pytest.mark.extended

@@ -72,6 +72,17 @@ class Acceptance(Table):
         """The key in the file, a hash of the content, so that two branches do not use the same key for different acceptances."""
         return digest(self.model_dump())[:KEY_LENGTH]
 
+    def relabelled(self, labels: Mapping[str, str]) -> "Acceptance":
+        """The acceptance with other labels of engines, by their labels in it."""
+        names = {engine_name(old): engine_name(new) for old, new in labels.items()}
+        return self.model_copy(
+            update={
+                "versions": {names.get(name, name): version for name, version in self.versions.items()},
+                "adapters": {labels.get(label, label): code for label, code in self.adapters.items()},
+                "settings": {labels.get(label, label): settings for label, settings in self.settings.items()},
+            }
+        )
+
     def stamp_of(self, engine: str) -> dict[str, Any]:
         """The provenance of the accepted run, as `attribution.attribute` needs it; files of old dropspin versions lack some of it."""
         version = self.versions.get(engine_name(engine))
@@ -124,6 +135,20 @@ class Baseline:
     scenes: Mapping[str, str] = field(default_factory=dict)
     motions: Mapping[str, Digests] = field(default_factory=dict)
     results: pd.DataFrame = field(default_factory=lambda: _table([]))
+
+    def relabelled(self, labels: Mapping[str, str]) -> "Baseline":
+        """The baseline with other labels of engines, by their labels in it."""
+
+        def motions(digests: Digests) -> Digests:
+            return {(scene, labels.get(engine, engine), step): one for (scene, engine, step), one in digests.items()}
+
+        return Baseline(
+            {key: one.relabelled(labels) for key, one in self.acceptances.items()},
+            {labels.get(label, label): name for label, name in self.engines.items()},
+            self.scenes,
+            {by: motions(digests) for by, digests in self.motions.items()},
+            self.results.assign(engine=self.results["engine"].replace(dict(labels))),
+        )
 
 
 def load_baseline(path: str | Path) -> Baseline:

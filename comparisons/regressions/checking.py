@@ -5,7 +5,7 @@ A check adds a row of kind `baseline` with a verdict for each accepted result, a
 
 import datetime
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from dropspin.comparisons.judging.verdicts import FAILURES, Verdict
-from dropspin.comparisons.regressions.attribution import CORRECTION, Attribution, attribute, common_settings
+from dropspin.comparisons.regressions.attribution import CORRECTION, Attribution, attribute, common_settings, surroundings
 from dropspin.comparisons.regressions.baseline import COLUMNS, Acceptance, Baseline, load_baseline
 from dropspin.comparisons.regressions.changes import (
     KEY,
@@ -91,7 +91,9 @@ def accept(
         DropspinError: The run was made with `quick`, or the reason is empty or has several lines.
     """
     verify_comparable(results)
-    measured, covered = comparable_results(results), asked_for(earlier.results, results)
+    measured = comparable_results(results)
+    earlier = _with_current_names(earlier, results, set(measured["engine"]))
+    covered = asked_for(earlier.results, results)
     measured["known_failure"] = (measured["verdict"] == "failed") & known_failures
     comparable = covered[~_has_other_scene(covered, earlier, results)]
     found = changes(comparable, measured)
@@ -146,7 +148,8 @@ def check(results: Results, baseline: Baseline | str | Path | None = None) -> Ch
         nothing = comparable_results(results).iloc[:0]
         return Checked(results, changes(nothing, nothing), nothing)
     verify_comparable(results)
-    accepted = asked_for(_with_current_names(baseline, results), results)
+    baseline = _with_current_names(baseline, results, results.engines)
+    accepted = asked_for(baseline.results, results)
     if accepted.empty and not results.breakdowns.any():
         raise NothingAccepted(
             f"none of the {len(baseline.results):,} accepted results is covered by this run's scenes, engines and time steps; "
@@ -189,10 +192,16 @@ def _keys(rows: pd.DataFrame) -> pd.MultiIndex:
 def _causes(found: pd.DataFrame, baseline: Baseline, results: Results) -> dict[int, Attribution]:
     """By the number of its row, the cause to which each failing accepted result is attributed."""
     stamp, digests = results.provenance, digests_of(results.provenance)
-    unmoved = [str(engine) for engine, changes in found.groupby("engine")["change"] if set(changes) == {"same"}]
+    same = {str(engine): set(rows["by"]) for engine, rows in found.groupby("engine") if set(rows["change"]) == {"same"}}
+
+    @cache
+    def around(by: str) -> Mapping[str, str]:
+        return surroundings(baseline.acceptances[by].stamp_of(""), stamp)
 
     @cache
     def attributed(engine: str, by: str, motions: Motion) -> Attribution:
+        # Libraries that have not changed since the results of another engine were accepted are not excluded by these.
+        unmoved = [other for other, accepted in same.items() if all(around(by).items() <= around(one).items() for one in accepted)]
         return attribute(baseline.acceptances[by].stamp_of(engine), stamp, engine, unmoved, motions)
 
     failing = regressed(found)
@@ -202,12 +211,12 @@ def _causes(found: pd.DataFrame, baseline: Baseline, results: Results) -> dict[i
     }
 
 
-def _with_current_names(baseline: Baseline, results: Results) -> pd.DataFrame:
-    """The accepted results, in which an engine with another label, or one that cannot be imported, is identified by its requested name."""
+def _with_current_names(baseline: Baseline, results: Results, labels: Collection[str]) -> Baseline:
+    """The baseline, in which an engine that has another label in a run, one of some, has this one: they were asked for by one name."""
     held = set(baseline.results["engine"])
-    called = {name: label for label, name in results.provenance["names"].items() if label not in held}
+    called = {name: label for label, name in results.provenance["names"].items() if label in labels and label not in held}
     renamed = {old: called[name] for old, name in baseline.engines.items() if old not in results.engines and name in called}
-    return baseline.results.assign(engine=baseline.results["engine"].replace(renamed))
+    return baseline.relabelled(renamed) if renamed else baseline
 
 
 def _row(found: Mapping[Any, Any], verdict: Verdict, reason: str, **others: Any) -> Measurement:

@@ -26,6 +26,7 @@ from support.releases import (
     failing,
     part,
     relabelled,
+    released,
 )
 
 from dropspin import scenarios
@@ -168,11 +169,28 @@ def test_renamed_engine_is_compared_by_the_name_it_was_asked_for_by(release):
     """A new label does not escape the accepted results, until results with it are accepted."""
     base = accept(named(part(release(Candidate), "drop-ball"), candidate="m:C"), Baseline(), "first", TODAY)[0]
     assert base.engines == {"candidate": "m:C"}
-    renamed = named(relabelled(part(release(TooLively), "drop-ball"), "candidate", "renamed"), renamed="m:C")
+    renamed = named(relabelled(released(part(release(TooLively), "drop-ball"), "1.1"), "candidate", "renamed"), renamed="m:C")
     worse = failing(check(renamed, base))
     assert set(worse["engine"]) == {"renamed"}
     assert "restitution_error" in set(worse["metric"])
-    assert failing(check(renamed, accept(renamed, base, "so it is called", TODAY)[0])).empty
+    accepted, found = accept(renamed, base, "so it is called", TODAY)
+    assert failing(check(renamed, accepted)).empty
+    assert {"same", "worse"} <= set(found["change"])
+    assert set(accepted.results["engine"]) == {"renamed"}
+    [(engine, cause)] = check(renamed, base).attributions
+    assert (engine, cause.origin) == ("renamed", "engine")
+    assert "renamed 1.0 → 1.1" in cause.message
+
+
+def test_engine_accepted_with_the_libraries_of_the_run_does_not_exclude_them(release):
+    """MuJoCo's results are the same, but were accepted with the NumPy of the run, and those of the candidate with another one."""
+    first, both = part(release(Candidate), "drop-ball"), part(release(TooLively, "mujoco"), "drop-ball")
+    stamp = first.provenance | {"versions": first.provenance["versions"] | {"numpy": "1.0"}}
+    base = accept(replace(first, provenance=stamp), Baseline(), "first", TODAY)[0]
+    base = accept(part(both, engines=["mujoco"]), base, "beside it", TODAY)[0]
+    [(_, cause)] = check(both, base).attributions
+    assert "numpy 1.0 → " in cause.message
+    assert "the results of mujoco are the same" not in cause.message
 
 
 def test_engine_that_cannot_be_imported_has_lost_its_results(release, tmp_path, monkeypatch):

@@ -24,6 +24,9 @@ from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.start_phases import StartPhase
 from dropspin.scenarios import truth_for
 
+MOST = 0.5
+"""Share of a change that reverting settings takes away, at least; from few starts, it is not known better than within a third."""
+
 
 def with_explaining_settings(checked: Checked, baseline: Baseline | None, *, imports: bool) -> Checked:
     """A check with rows of kind `setting` for each engine of which settings changed since its results were accepted, and results fail.
@@ -48,7 +51,7 @@ def with_explaining_settings(checked: Checked, baseline: Baseline | None, *, imp
 
 
 def _rows(changed: "pd.Series[Any]", results: Results, baseline: Baseline, imports: bool) -> Iterator[Measurement]:
-    """Rows for the settings of an engine that explain the change of a result."""
+    """Rows for the settings of an engine that explain the change of a result; none if reverting all of them leaves most of it."""
     label, scene, dt, metric = changed["engine"], results.scenes[changed["scene"]], float(changed["steps"]), METRICS[changed["metric"]]
     name = results.provenance["names"].get(label)  # none of an engine that was given as an object
     engine = engine_entry(name).engine if name and (imports or not is_foreign(parsed(name)[0])) else None
@@ -60,5 +63,9 @@ def _rows(changed: "pd.Series[Any]", results: Results, baseline: Baseline, impor
     entry = engine_entry(replace(engine, options={**engine.options, **{name: now[name] for name in back}}))
     with EngineProcesses(ResourceLimits()) as processes:
         error_of = EngineStudy(StartPhase(scene, truth_for(scene)), entry, processes, ignore).error_of(metric, dt)
+        reverted = replace(entry.adapter, options={**entry.adapter.options, **back})
+        change, undone = changed["value"] - changed["before"], error_of(entry.adapter) - error_of(reverted)
+        if not undone / change >= MOST:
+            return
         for names, share in explaining(entry.adapter, back, error_of, back).items():
             yield Case(scene.name, label, dt).measurement("setting", metric.name, "1", Judgement(share, "measured"), names)

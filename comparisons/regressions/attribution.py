@@ -121,10 +121,11 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str], mot
     if around and around.keys() <= OF_DROPSPIN and own.keys() <= ({"adapter"} if name in BUILT_IN else set()):
         if motions == "different" and name == OWN_ENGINE:
             return Attribution("dropspin", f"a change of dropspin, of which {name} is a part: {listed}")
-        if motions == "different" and not own:
-            return Attribution("either", f"{listed}; the cause cannot be isolated, because the motions of {name} differ too")
-        message = f"{CORRECTION}{', as far as it is recorded' * (motions == 'unknown')}: {listed}"
-        return Attribution("dropspin", message, is_correction=True)
+        if not own:
+            differ = f"the motions of {name} differ"
+            why = f"{differ} too" if motions == "different" else f"it is not recorded whether {differ}"
+            return Attribution("either", f"{listed}; the cause cannot be isolated, because {why}")
+        return Attribution("dropspin", f"{CORRECTION}{', as far as it is recorded' * (motions == 'unknown')}: {listed}", is_correction=True)
     others = f"but the results of {', '.join(sorted(unmoved))} are the same"
     if not own:
         possible = [text for part, text in around.items() if not unmoved or motions == "same" or part in OF_DROPSPIN]

@@ -171,12 +171,13 @@ def compared_digests(row: Mapping[Any, Any], old: Digests, new: Digests) -> Moti
         new: Those of the later motions.
 
     Returns:
-        `unknown` where a hash is missing, and for means of ensembles and symmetries, which have other motions.
+        `unknown` where a hash is missing, and for means of ensembles and symmetries, which have other motions, unless the former differ.
     """
     pairs = [(old.get(key), new.get(key)) for key in ((row["scene"], row["engine"], step) for step in row["steps"].split(", "))]
-    if row["kind"] not in ("truth", "invariant", "order", "asymptotic_error") or any(None in pair for pair in pairs):
-        return "unknown"
-    return "same" if all(one == other for one, other in pairs) else "different"
+    if any(None not in pair and pair[0] != pair[1] for pair in pairs):
+        return "different"
+    is_measured_from = row["kind"] in ("truth", "invariant", "order", "asymptotic_error")
+    return "same" if is_measured_from and not any(None in pair for pair in pairs) else "unknown"
 
 
 class EqualMotions(NamedTuple):

@@ -40,3 +40,19 @@ def test_check_names_the_setting_of_the_adapter_that_changed_its_results(monkeyp
     named = replace(checked.results, provenance=checked.results.provenance | {"names": {"pybullet": "not_imported:Engine"}})
     monkeypatch.setattr(ablation, "engine_entry", lambda name: pytest.fail(f"imported {name}"))
     assert with_explaining_settings(replace(checked, results=named), accepted, imports=False).results.table.equals(named.table)
+
+
+def test_changed_setting_that_takes_none_of_a_change_away_explains_nothing():
+    """The impedance of contacts changed, which moves the rebound little, and the error by something else."""
+    ball = load("drop-ball").model_copy(update={"duration": 0.8})
+    found = run(ball, "mujoco", 4e-3)
+    accepted, _ = accept(found, Baseline(), "first", datetime.date(2026, 3, 1))
+    [(key, acceptance)] = accepted.acceptances.items()
+    settings = {"mujoco": acceptance.settings["mujoco"] | {"solimp": "0.99989 0.99989 0.001 0.5 2"}}
+    smaller = accepted.results["value"].where(accepted.results["metric"] != "energy_error", 0.0)
+    results = accepted.results.assign(value=smaller)
+    lower = replace(accepted, acceptances={key: acceptance.model_copy(update={"settings": settings})}, results=results)
+    checked = check(found, lower)
+    [(_, cause)] = checked.attributions
+    assert "solimp" in cause.message
+    assert with_explaining_settings(checked, lower, imports=True).results.table.query("kind == 'setting'").empty

@@ -1,6 +1,6 @@
 """Two runs compared, and histories of runs: the results that changed, and the causes to which the changes are attributed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import pandas as pd
@@ -25,6 +25,9 @@ from dropspin.comparisons.regressions.changes import (
 from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.scenarios import DropspinError
+
+CHANGED = ["worse", "moved", "better", "gone"]
+"""The kinds of change that a history lists."""
 
 
 class Changes(NamedTuple):
@@ -83,11 +86,15 @@ def compare(old: Results, new: Results) -> Changes:
     if found.empty:
         why = f"{', '.join(other)} changed between them" if other else "no scene, engine and time step was requested in both"
         raise DropspinError(f"the runs have no result in common: {why}.")
-    changed = {str(engine): rows[rows["change"] != "same"] for engine, rows in found.groupby("engine")}
-    unmoved = [engine for engine, rows in changed.items() if rows.empty]
-    attributions = {engine: _attributed(rows, old, new, engine, unmoved) for engine, rows in changed.items() if len(rows)}
+    changed, unmoved = found[found["change"] != "same"].groupby("engine"), _unmoved(found)
+    attributions = {str(engine): _attributed(rows, old, new, str(engine), unmoved) for engine, rows in changed}
     around = list(surroundings(old.provenance, new.provenance).values())
     return Changes(found, attributions, around, other, _in_one_only(old, new), speed_changes(old, new), equal_motions(old, new, other))
+
+
+def _unmoved(found: pd.DataFrame) -> list[str]:
+    """The engines whose results are all the same."""
+    return [str(engine) for engine, kinds in found.groupby("engine")["change"] if set(kinds) == {"same"}]
 
 
 def _attributed(rows: pd.DataFrame, old: Results, new: Results, engine: str, unmoved: Sequence[str]) -> Attribution:
@@ -115,9 +122,9 @@ class Move(NamedTuple):
 
     Attributes:
         engine: Label of the engine.
-        before: Number of the last earlier run that contains this engine.
+        before: Number of the last earlier run from which these results differ by more than their tolerance.
         run: Number of the run in which the results changed.
-        results: The changes (worse, better, moved or gone) that `changes.changes` returns, largest first.
+        results: The changes (worse, better, moved or gone) since then that `changes.changes` returns, largest first.
         attribution: The cause to which the changes are attributed.
     """
 
@@ -179,7 +186,6 @@ def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> li
     """
     held: dict[str, pd.DataFrame] = {}
     scenes: dict[str, str] = {}
-    last: dict[str, int] = {}
     absent: dict[str, list[tuple[str, ...]]] = {}
     found = []
     for run, one in enumerate(results):
@@ -194,16 +200,29 @@ def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> li
             before = asked_for(earlier, one)
             change = changes(before, now)
             keys, is_gone = pd.MultiIndex.from_frame(change[KEY]), change["change"] == "gone"
-            is_new = is_gone & ~keys.isin(absent.get(engine, []))
+            was_gone = is_gone & keys.isin(absent.get(engine, []))
             absent[engine] = [*set(absent.get(engine, [])).difference(keys), *keys[is_gone]]
-            moved[engine] = most_changed_first(change[change["change"].isin(["worse", "moved", "better"]) | is_new])
+            moved[engine] = change.loc[change["change"].isin(CHANGED) & ~was_gone, KEY]
             stays = change["change"].isin(["same", "gone", "undefined"])
             kept, fresh = before.merge(change.loc[stays, KEY], on=KEY), now.merge(change.loc[~stays, KEY], on=KEY)
             held[engine] = pd.concat([earlier.drop(before.index), kept, fresh], ignore_index=True)
-        unmoved = [engine for engine, differing in moved.items() if differing.empty and engine in last]
         for engine, differing in moved.items():
-            if len(differing):
-                before_it = results[last[engine]]
-                found.append(Move(engine, last[engine], run, differing, _attributed(differing, before_it, one, engine, unmoved)))
-        last |= dict.fromkeys(results_of[run]["engine"], run)
+            for number, rows in _since(differing, results_of[:run], results_of[run]):
+                unmoved = _unmoved(compare(results[number], one).results)
+                found.append(Move(engine, number, run, rows, _attributed(rows, results[number], one, engine, unmoved)))
     return found
+
+
+def _since(keys: pd.DataFrame, earlier: Sequence[pd.DataFrame], now: pd.DataFrame) -> Iterator[tuple[int, pd.DataFrame]]:
+    """The changes of some results, each since the last earlier run from which it differs by more than its tolerance, by these runs.
+
+    Of a slow drift that is not the run before, which alone may not have caused the change.
+    """
+    for number, rows in reversed(list(enumerate(earlier))):
+        found = changes(rows.merge(keys, on=KEY), now.merge(keys, on=KEY))
+        found = found[found["change"].isin(CHANGED)]
+        if len(found):
+            yield number, most_changed_first(found)
+            keys = keys[~pd.MultiIndex.from_frame(keys).isin(pd.MultiIndex.from_frame(found[KEY]))]
+        if keys.empty:
+            return

@@ -37,6 +37,29 @@ def test_history_finds_the_run_in_which_results_moved(before, release):
     assert set(move.results["scene"]) >= TURNING
 
 
+def test_change_of_a_scene_that_the_run_between_did_not_have_is_attributed_to_the_run_that_had_it(before, release):
+    runs = dated(before, part(released(release(Candidate, "mujoco"), "2.0"), "drop-ball"), released(release(Euler, "mujoco"), "2.0"))
+    [move] = history(runs).moves
+    assert (move.before, move.run, {*move.results["scene"]}) == (0, 2, TURNING)
+    assert move.attribution.message == "attributed to the engine: candidate 1.0 → 2.0, its settings (rotation)"
+
+
+def drifted(results, tolerances):
+    """A run in which one result of the candidate is some of its tolerances worse."""
+    table = results.table.copy()
+    one = (table[["engine", "scene", "metric", "dt"]] == ["candidate", "fall-spin", "orientation_error", 4e-3]).all(axis=1)
+    table.loc[one, "value"] += tolerances * table.loc[one, "tolerance"]
+    return replace(results, table=table)
+
+
+def test_drift_is_attributed_to_the_last_run_that_differs_by_more_than_the_tolerance(before, release):
+    """A jump to the run before it."""
+    drifts = [released(drifted(before, step), f"1.{number}") for number, step in enumerate((0.0, 0.5, 0.9, 1.4, 7.0))]
+    moves = history(dated(*drifts)).moves
+    assert [(move.before, move.run, *move.results["in_tolerances"].round(6)) for move in moves] == [(0, 3, 1.4), (3, 4, 5.6)]
+    assert [move.attribution.message[-9:] for move in moves] == ["1.0 → 1.3", "1.3 → 1.4"]
+
+
 def test_history_of_one_run_is_refused(before):
     with pytest.raises(DropspinError, match=r"^a history needs two or more runs, got 1; give more, or a folder of runs\.$"):
         history({"a": before})

@@ -132,7 +132,7 @@ def _stays_flat(scene: Scenario, floor: Floor) -> bool:
     lowest = scene.body.lowest(np.array(start.orientation), 1e-12)
     rests = scene.starts_on_floor and not start.velocity[1]
     under_centre = np.abs(lowest[:, [0, 2]].mean(axis=0)).max() <= 1e-12 * scene.body.size or (rests and _surrounds_the_centre(lowest))
-    is_carried = len(lowest) >= 3 or (bool(scene.body.semi_axes.any()) and _lies(scene))
+    is_carried = _surrounds_the_centre(lowest) or (bool(scene.body.semi_axes.any()) and _lies(scene))
     return is_carried and bool(under_centre) and _turns_about_the_vertical(scene)
 
 

@@ -262,3 +262,19 @@ def test_a_spin_of_a_solid_ellipsoid_about_its_shortest_axis_is_stable():
     start = {"position": [0.0, 0.1, 0.0], "angular_velocity": [0.0, 27.0, 0.0]}
     floor, gravity = {"restitution": 0.0, "friction": "none"}, {"acceleration": [0.0, -9.8, 0.0]}
     assert truth_for(load({"duration": 10.0, "body": body, "start": start, "gravity": gravity, "floor": floor})).horizon == 10.0
+
+
+def test_an_edge_with_a_vertex_within_it_is_no_face():
+    """Two descriptions of one body: a prism whose lower edge has an end in the middle too."""
+    edge, top = [[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]], [[0.0, 0.2, 0.05], [0.0, 0.2, -0.05]]
+
+    def truth(points):
+        body = {"shape": "vertices", "points": points, "mass": 1.0, "inertia": [0.001] * 3, "center_of_mass": [0.0, 0.1, 0.0]}
+        scene = {"body": body, "start": {"position": [0.0, 0.5, 0.0]}, "floor": {"restitution": 0.3, "friction": "infinite"}}
+        return truth_for(load(scene | {"duration": 3.0, "gravity": {"acceleration": [0.0, -9.8, 0.0]}}))
+
+    plain, divided = truth([*edge, *top]), truth([*edge, [0.0, 0.0, 0.0], *top])
+    assert plain.name == "edge-impact"
+    assert (divided.horizon, divided.ends) == (plain.horizon, plain.ends)
+    t = np.linspace(0.0, plain.horizon, 20)
+    np.testing.assert_array_equal(divided(t).states, plain(t).states)

@@ -29,9 +29,25 @@ def openness(points: Array, faces: Faces) -> str:
     first, second = merged.reshape(-1)[faces][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).T
     here, there = first * len(points) + second, second * len(points) + first
     if np.array_equal(np.sort(here), np.sort(there)):
-        return ""
+        return "has triangles that are inside out beside others" if _has_part_inside_out(points, merged.reshape(-1)[faces], faces) else ""
     are_pairs = np.unique(np.minimum(here, there), return_counts=True)[1] % 2 == 0
     return "has triangles that are inside out beside others" if are_pairs.all() else "is not closed"
+
+
+def _has_part_inside_out(points: Array, merged: Faces, faces: Faces) -> bool:
+    """Whether a closed part is inside out and no cavity: not within the bounds of one that is not."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count, first, second = len(points), merged[:, [0, 1]].ravel(), merged[:, [1, 2]].ravel()
+    part = connected_components(coo_array((np.ones(len(first)), (first, second)), shape=(count, count)), directed=False)[1][merged[:, 0]]
+    corners = points[faces]
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low, part, corners.min(axis=1))
+    np.maximum.at(high, part, corners.max(axis=1))
+    volumes = np.bincount(part, np.linalg.det(corners), minlength=count)
+    outer, inner = volumes * volumes.sum() > 0.0, volumes * volumes.sum() < -ROUNDING * volumes.sum() ** 2
+    return any(not ((low[outer] < low[own]) & (high[own] < high[outer])).all(axis=1).any() for own in np.flatnonzero(inner))
 
 
 class Mesh(Shape):

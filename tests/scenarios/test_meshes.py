@@ -105,6 +105,22 @@ def test_a_box_as_a_mesh_is_the_box():
     assert body(corners, faces[:-1], inertia="surface").centre.any()
 
 
+def test_a_part_inside_out_is_a_cavity_within_another_part_and_refused_beside_it():
+    """A cavity takes a mass away, of a density that counts for the rest; a part beside the others would too."""
+    large, small = 4.0 * np.array(TETRAHEDRON), np.array(TETRAHEDRON)
+    inverted = [[a + 4, c + 4, b + 4] for a, b, c in OUTWARD]
+
+    def both(offset):
+        return np.vstack([large, small + offset]).tolist()
+
+    hollow = body(both(0.3), [*OUTWARD, *inverted])
+    assert hollow.content == pytest.approx(63.0 * abs(body(small.tolist(), OUTWARD).content))
+    with pytest.raises(SceneError, match="has triangles that are inside out beside others"):
+        body(both(30.0), [*OUTWARD, *inverted])
+    with pytest.raises(SceneError, match="has triangles that are inside out beside others"):
+        body(both(30.0), [[a, c, b] for a, b, c in OUTWARD] + [[a + 4, b + 4, c + 4] for a, b, c in OUTWARD])
+
+
 @pytest.mark.parametrize("kind", ["obj", "binary", "ascii"])
 def test_files_of_each_kind_are_the_same_body(tmp_path, kind):
     """A tetrahedron from a file beside the scene's file, scaled from millimetres, is that of its points; so is its exact motion."""

@@ -174,7 +174,7 @@ def load_baseline(path: str | Path) -> Baseline:
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
     for scene, of_scene in written.results.items():
         if scene not in written.scenes:
-            raise DropspinError(f"{where}: scenes: {scene!r} has results, but no digest; accept them again.")
+            raise DropspinError(f"{where}: scenes: {scene!r} has results, but no digest; remove its results, and accept them again.")
         if len({*map(current_label, of_scene)}) < len(of_scene):
             raise DropspinError(f"{where}: results of {scene}: an engine is listed by two names; remove the lines of the earlier one.")
     rows = [_row(where, keys, content, acceptances) for keys, content in leaves(written.results, 4)]

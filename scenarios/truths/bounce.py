@@ -16,6 +16,7 @@ surface, until its impacts, or its spin at rest, have amplified small difference
 """
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -69,16 +70,10 @@ def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
         rows[:, 8] = speed - pull * since
         return rows
 
-    until, ends = min(scene.duration, sideways_and_spin.horizon), TURNS_OVER
-    tilted = corner_impact(scene, floor) if _lands_on_a_point(scene) and len(leaving) else None
-    if tilted is not None and tilted.ends == TOO_SENSITIVE and tilted.horizon < until:
-        until, ends = tilted.horizon, TOO_SENSITIVE
-    rest = float(starts[-1])
-    if rest < until and start[SPIN].any() and _lands_on_a_point(scene):
-        at_rest = states(np.array([rest]))[0]
-        at_rest[8] = 0.0
-        growth = growth_of_a_spin(scene.starting_at(at_rest))
-        until, ends = min((until, ends), (rest + math.log(MAX_GROWTH) / growth if growth else until, GROWS))
+    ends = [(scene.duration, ""), (sideways_and_spin.horizon, TURNS_OVER)]
+    if _lands_on_a_point(scene):
+        ends += _of_a_point(scene, floor, float(starts[-1]), states(starts[-1:])[0])
+    until, why = min(ends)
     times = starts[1:][starts[1:] <= until]
     before, after = states(times), states(times)
     before[:, 1] = after[:, 1] = floor_height
@@ -90,13 +85,23 @@ def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
     if u0 == 0.0:
         stays = "slides on the floor at a constant velocity" if start[7] or start[9] else "rests on the floor"
         statement = f"the body {stays} and turns about the vertical at the constant angular velocity ω, by the angle ω t"
-    return Truth("bounce-ladder", statement, states, impacts_of(times, before, after), until, ends if until < scene.duration else "")
+    return Truth("bounce-ladder", statement, states, impacts_of(times, before, after), until, why)
 
 
 def _lands_on_a_point(scene: Scenario) -> bool:
     """Whether the body is round, no ball, and has one lowest point."""
     is_round = bool(scene.body.semi_axes.any()) and not scene.body.is_ball
     return is_round and len(scene.body.lowest(np.array(scene.start.orientation), 1e-12)) == 1
+
+
+def _of_a_point(scene: Scenario, floor: Floor, rest: float, at_rest: Array) -> Iterator[tuple[float, str]]:
+    """When impacts, or a spin from the time of rest on, have amplified small differences too much [s], and why the solution ends then."""
+    struck = corner_impact(scene, floor)
+    if struck is not None and struck.ends == TOO_SENSITIVE:
+        yield struck.horizon, TOO_SENSITIVE
+    at_rest[8] = 0.0
+    if at_rest[SPIN].any() and (growth := growth_of_a_spin(scene.starting_at(at_rest))):
+        yield rest + math.log(MAX_GROWTH) / growth, GROWS
 
 
 def _leaving_speeds(u0: float, g: float, floor: Floor, remaining: float) -> Array | None:

@@ -11,8 +11,8 @@ Valid for: a ball on a frictionless floor, with any spin and any horizontal moti
 where it can lie, such as a capsule on its side, on a frictionless floor, with any horizontal motion and with spin only about the vertical,
 up to rounding; each of these on any floor, if it has no spin and no horizontal motion; gravity straight down, no damping. A body that lands
 has the mean of its lowest points under its centre of mass; one that rests has its centre of mass above the inside of its base. Valid until
-a difference of one eps in a spin about the intermediate axis can turn the body over, or, of a body that lands on one point of a curved
-surface, until its impacts, or its spin at rest, have amplified small differences too much.
+a difference of one eps in a spin about the intermediate axis can turn the body over, or, of a body that lands on a point or a line of a
+curved surface, until its impacts, or its spin at rest, have amplified small differences too much.
 """
 
 import math
@@ -22,9 +22,9 @@ import numpy as np
 
 from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
-from dropspin.scenarios.state import SPIN, Array
+from dropspin.scenarios.state import SPIN, UP, Array
 from dropspin.scenarios.surfaces import Floor
-from dropspin.scenarios.truths.corner_impact import MAX_GROWTH, TOO_SENSITIVE, corner_impact
+from dropspin.scenarios.truths.corner_impact import DISTURBED_DIRECTION, MAX_GROWTH, TOO_SENSITIVE, corner_impact
 from dropspin.scenarios.truths.flight import TURNS_OVER, flight_states
 from dropspin.scenarios.truths.point_contact import GROWS, growth_of_a_spin
 from dropspin.scenarios.truths.truth import Truth, impacts_of, piece
@@ -35,6 +35,15 @@ MIN_FLIGHT_SHARE = 1e-12
 
 DIRECTIONS, SMALL_TURN = 16, 1e-3
 """The small rotations by which the code tests whether a round body lies: the number of horizontal axes, and the angle [rad]."""
+
+FLAT = 1e-9
+"""Depth of the curved surface below its centre, relative to the size, up to which a face is lowest."""
+
+LAST = 1e-3
+"""Share of the time up to rest in which impacts follow one another so fast that a disturbed motion has another number of them."""
+
+JUST_BEFORE = 1e-9
+"""An impact that amplifies small differences too much is not part of the solution; relative to its time."""
 
 SPIN_ROUNDING = 1e-15
 """Largest horizontal part of an angular velocity about the vertical that counts as rounding, relative to the angular velocity."""
@@ -71,8 +80,9 @@ def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
         return rows
 
     ends = [(scene.duration, ""), (sideways_and_spin.horizon, TURNS_OVER)]
-    if _lands_on_a_point(scene):
-        ends += _of_a_point(scene, floor, float(starts[-1]), states(starts[-1:])[0])
+    below_centre = scene.body.semi_axes * unrotate(np.array(scene.start.orientation), UP)
+    if np.linalg.norm(below_centre) > FLAT * scene.body.size and not scene.body.is_ball:
+        ends += _of_a_curved_surface(scene, floor, float(starts[-1]), states(starts[-1:])[0])
     until, why = min(ends)
     times = starts[1:][starts[1:] <= until]
     before, after = states(times), states(times)
@@ -88,19 +98,19 @@ def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
     return Truth("bounce-ladder", statement, states, impacts_of(times, before, after), until, why)
 
 
-def _lands_on_a_point(scene: Scenario) -> bool:
-    """Whether the body is round, no ball, and has one lowest point."""
-    is_round = bool(scene.body.semi_axes.any()) and not scene.body.is_ball
-    return is_round and len(scene.body.lowest(np.array(scene.start.orientation), 1e-12)) == 1
+def _of_a_curved_surface(scene: Scenario, floor: Floor, rest: float, at_rest: Array) -> Iterator[tuple[float, str]]:
+    """When impacts, or a spin from the time of rest on, have amplified small differences too much [s], and why the solution ends then.
 
-
-def _of_a_point(scene: Scenario, floor: Floor, rest: float, at_rest: Array) -> Iterator[tuple[float, str]]:
-    """When impacts, or a spin from the time of rest on, have amplified small differences too much [s], and why the solution ends then."""
-    struck = corner_impact(scene, floor)
-    if struck is not None and struck.ends == TOO_SENSITIVE:
-        yield struck.horizon, TOO_SENSITIVE
+    On two points, as the ends of a line, the body stays on both if it turns about that line alone.
+    """
+    lowest = scene.body.lowest(np.array(scene.start.orientation), 1e-12)
+    line = lowest[-1] - lowest[0]
+    along = np.concatenate([np.zeros(10), line / np.linalg.norm(line)]) if len(lowest) > 1 else DISTURBED_DIRECTION
+    struck = corner_impact(scene, floor, disturbed=along)
+    if struck is not None and struck.ends == TOO_SENSITIVE and struck.horizon < (1.0 - LAST) * rest:
+        yield (1.0 - JUST_BEFORE) * struck.horizon, TOO_SENSITIVE
     at_rest[8] = 0.0
-    if at_rest[SPIN].any() and (growth := growth_of_a_spin(scene.starting_at(at_rest))):
+    if len(lowest) == 1 and at_rest[SPIN].any() and (growth := growth_of_a_spin(scene.starting_at(at_rest))):
         yield rest + math.log(MAX_GROWTH) / growth, GROWS
 
 

@@ -51,16 +51,17 @@ LAW_NAMES = {
 }
 
 
-def corner_impact(scene: Scenario, floor: Floor, law: Law | None = None) -> Truth | None:
+def corner_impact(scene: Scenario, floor: Floor, law: Law | None = None, disturbed: Array = DISTURBED_DIRECTION) -> Truth | None:
     """The exact solution of a drop on a corner, an edge or as a ball, up to the time at which a disturbance has grown too much.
 
     Args:
         scene: The scene, without damping.
         floor: Its floor.
         law: The impact law; by default that of each surface.
+        disturbed: The direction of the disturbance, shape (13,).
     """
     planes = [_Plane(surface, law or law_of(scene, surface), number) for number, surface in enumerate(scene.surfaces)]
-    flights = _until_sensitive(scene, planes)
+    flights = _until_sensitive(scene, planes, disturbed)
     events = tuple(flight.impact for flight in flights if flight.impact is not None)
     begins, last = np.array([0.0, *(event.time for event in events)]), flights[-1]
     if last.end == 0.0 or (not events and last.is_other_impact):
@@ -197,11 +198,11 @@ def _impact(scene: Scenario, plane: _Plane, touching: Array, time: float, before
     return Impact(time, before, after, plane.number - 1 if plane.number else None)
 
 
-def _until_sensitive(scene: Scenario, planes: Sequence[_Plane]) -> list[_Flight]:
+def _until_sensitive(scene: Scenario, planes: Sequence[_Plane], direction: Array) -> list[_Flight]:
     """The flights up to the impact after which a disturbance of the initial state has grown by more than `MAX_GROWTH`."""
     per_radian = np.array([scene.body.size] * 3 + [1.0] * 3)  # speeds, m/s, to rates of rotation
     flights: list[_Flight] = []
-    disturbed = _flights(scene, planes, scene.initial_state + DISTURBANCE * DISTURBED_DIRECTION)
+    disturbed = _flights(scene, planes, scene.initial_state + DISTURBANCE * direction)
     others: list[_Flight] = []
     for number, flight in enumerate(_flights(scene, planes, scene.initial_state)):
         flights.append(flight)

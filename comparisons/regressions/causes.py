@@ -120,14 +120,16 @@ def _sizes(scene: Scenario, parameter: Parameter, failed: pd.DataFrame, dt: floa
 
 def _explained(scene: Scenario, fault: FaultModel, rows: list[dict[Hashable, Any]], dt: float) -> int | None:
     """How many of the failed asymptotic errors of a scene a cause has; None if it has another error than one of those that it defines."""
-    coarse, fine = (_caused(scene, fault, step) for step in (dt, 0.5 * dt))
+    fine = _caused(scene, fault, 0.5 * dt)
+    halves = [_caused(scene, fault, dt, start) for start in (0.0, 0.5)]  # of its samples: the last one before an impact is in one alone
     count = 0
     for row in rows:
         metric = row["metric"]
         caused = fine.error(metric)
         if np.isnan(caused):
             continue
-        sampling = abs(caused - coarse.error(metric)) + abs(fine.sampled(metric)) + negligible(scene, row["unit"])
+        # With and without the cause, the sampling has an error, each half as large as that of a half.
+        sampling = max(abs(caused - half.error(metric)) + abs(half.sampled(metric)) for half in halves) + negligible(scene, row["unit"])
         lower = row["lower"] - sampling
         if not fine.is_whole:  # the largest error so far is a lower bound of the whole one
             lower, caused = (-np.inf, -np.inf if METRICS[metric].signed else caused)
@@ -144,9 +146,9 @@ def _with(parameter: Parameter, size: float) -> FaultModel:
 
 
 @lru_cache(maxsize=32)  # many faults of what is reported simulate the same scene
-def _exact(scene: Scenario, step: float, count: int) -> Trajectory | None:
+def _exact(scene: Scenario, step: float, count: int, start: float) -> Trajectory | None:
     truth = truth_for(scene)
-    return None if truth is None else exactly(truth, step * np.arange(count, dtype=float))
+    return None if truth is None else exactly(truth, step * (start + np.arange(count, dtype=float)))
 
 
 class _Caused(NamedTuple):
@@ -157,12 +159,12 @@ class _Caused(NamedTuple):
     is_whole: bool = False
 
 
-def _caused(scene: Scenario, fault: FaultModel, dt: float) -> _Caused:
-    """The errors that a cause has; NaN without an exact solution."""
+def _caused(scene: Scenario, fault: FaultModel, dt: float, start: float = 0.0) -> _Caused:
+    """The errors that a cause has, sampled from a start within the first step; NaN without an exact solution."""
     step = max(dt, scene.duration / MOST_STEPS)
-    count = 1 + scene.steps(step)
+    count = (1 if start == 0.0 else 0) + scene.steps(step)
     try:
-        reference, motion = _sampled(scene, step, count), _exact(fault.simulated(scene), step, count)
+        reference, motion = _sampled(scene, step, count, start), _exact(fault.simulated(scene), step, count, start)
     except (DropspinError, ValueError):  # the body is impossible
         return _Caused()
     if reference is None or motion is None:
@@ -175,9 +177,9 @@ def _caused(scene: Scenario, fault: FaultModel, dt: float) -> _Caused:
 
 
 @lru_cache(maxsize=256)  # of each scene it is needed for every cause
-def _sampled(scene: Scenario, step: float, count: int) -> tuple[Trajectory, Mapping[str, float]] | None:
+def _sampled(scene: Scenario, step: float, count: int, start: float) -> tuple[Trajectory, Mapping[str, float]] | None:
     """The exact solution of a scene at each time step, and the errors that its sampling has."""
-    exact = _exact(scene, step, count)
+    exact = _exact(scene, step, count, start)
     if exact is None:
         return None
     measured = _measured(scene, exact, exact)

@@ -10,7 +10,7 @@ from support.releases import TODAY, WithoutGyroscopicTerm, relabelled
 
 from dropspin.comparisons.faults import parameters as mistakes
 from dropspin.comparisons.regressions.baseline import Baseline
-from dropspin.comparisons.regressions.causes import causes
+from dropspin.comparisons.regressions.causes import _caused, _explained, _with, causes
 from dropspin.comparisons.regressions.checking import accept, check
 from dropspin.comparisons.regressions.parameters import PARAMETERS
 from dropspin.comparisons.running.run import DEFAULT_DTS, run
@@ -185,6 +185,16 @@ def test_check_prints_the_cause_first(capsys):
     assert capsys.readouterr().out.startswith("Possible cause of the asymptotic errors of mine: gravity 1 % too high.\n✗ ")
     page = markdown(document(checked, found, "out/run", None))
     assert "\n- Possible cause of the asymptotic errors of mine: gravity 1 % too high.\n- ✗ " in page
+
+
+def test_sampling_excludes_no_cause():
+    """Whether the last sample before the impact is one of every second sample or not, the energy gain until then is known to a step."""
+    ball, [gravity] = lasting("drop-ball", 0.8), [parameter for parameter in PARAMETERS if parameter.name == "gravity"]
+    for size in np.linspace(0.01, 0.03, 8):
+        fault = _with(gravity, size)
+        gain = _caused(ball, fault, 4e-5).error("energy_gain")
+        row = {"metric": "energy_gain", "unit": "1", "verdict": "failed", "lower": gain - 2e-6, "upper": gain + 2e-6}
+        assert _explained(ball, fault, [row], 2e-3) == 1, size
 
 
 def test_moments_that_no_body_has_explain_no_error():

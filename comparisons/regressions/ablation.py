@@ -25,7 +25,7 @@ from dropspin.comparisons.running.start_phases import StartPhase
 from dropspin.scenarios import truth_for
 
 MOST = 0.5
-"""Share of a change that reverting settings takes away, at least; from few starts, it is not known better than within a third."""
+"""Share of a change that reverting settings takes away, at least: it is known roughly, from few starts."""
 
 
 def with_explaining_settings(checked: Checked, baseline: Baseline | None, *, imports: bool) -> Checked:

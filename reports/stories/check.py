@@ -104,9 +104,8 @@ def _verdict(checked: Checked, failed_rows: pd.DataFrame, verdict: str) -> str:
 def accepted_sentences(results: Results, accepted: pd.DataFrame, known_failures: bool) -> list[str]:
     """Sentences on how many results of a run were accepted, and which cannot be accepted."""
     changed = accepted["change"].value_counts()
-    kinds = [
-        f"{changed[kind]:,} {kind}" for kind in ("new", "worse", "moved", "better", "lower", "gone", "undefined", "same") if kind in changed
-    ]
+    order = ("new", "worse", "moved", "better", "lower", "gone", "undefined", "same")
+    kinds = [f"{changed[kind]:,} {kind}" for kind in order if kind in changed]
     measured = ", ".join(engine for engine in results.engines if (accepted["engine"] == engine).any())
     notes = [f"Accepted for {counted(len(results.scenes), 'scene')} with {measured}: {', '.join(kinds) or 'no results'}."]
     removed = accepted.drop(asked_for(accepted, results).index).query("change in ['gone', 'undefined']")

@@ -134,13 +134,7 @@ def remedy(finding: Finding) -> str:
 def _values(finding: Finding) -> dict[str, Any]:
     """The columns of a finding, with its numbers in other units."""
     value, expected = finding.value, finding.expected
-    numbers: dict[str, Any] = {
-        "mm": 1e3 * value,
-        "ms": 1e3 * value,
-        "expected_ms": 1e3 * expected,
-        "rests_mm": 1e3 * finding.rests,
-        "expected_mm": 1e3 * expected,
-    }
+    numbers: dict[str, Any] = {"mm": 1e3 * value, "ms": 1e3 * value, "expected_ms": 1e3 * expected, "rests_mm": 1e3 * finding.rests}
     numbers |= {"mm_off": abs(1e3 * value), "side": "below" if value < 0.0 else "above"}
     numbers |= {"degrees": math.degrees(value), "percent": 100.0 * value, "expected_percent": 100.0 * expected}
     return vars(finding) | numbers

@@ -22,6 +22,8 @@ KEY = ["scene", "engine", "steps", "metric", "kind"]
 """The columns that identify a result; `steps` is the time step as text, or, for orders and asymptotic errors, all time steps used."""
 CONFIDENCE = 0.95
 """Of the interval of a change of speed."""
+NEAR_ORDERS = 0.1
+"""Difference of orders that higher powers of the time step may cause."""
 Digests = Mapping[tuple[str, str, str], str]
 """By scene, engine and time step as text: the hash of the motions that were measured."""
 Motion = Literal["same", "different", "unknown"]
@@ -122,7 +124,7 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
 
 
 def _is_lowered_by_better_errors(both: pd.DataFrame, change: NDArray[np.str_]) -> NDArray[np.bool_]:
-    """Whether each result is an order that is lower, although errors to which it is fitted are better and none is worse.
+    """Whether each result is an order that is a little lower, although errors to which it is fitted are better and none is worse.
 
     An order of three errors has a part that vanishes with the time step: errors that all halve change it in its third digit.
     """
@@ -130,7 +132,8 @@ def _is_lowered_by_better_errors(both: pd.DataFrame, change: NDArray[np.str_]) -
     errors = both.assign(better=change == "better", worse=~np.isin(change, ["better", "same", "new"]))[~both["kind"].isin(STUDIES)]
     of_errors = both[series].merge(errors.groupby(series)[["better", "worse"]].any().reset_index(), how="left", on=series)
     follows = of_errors["better"].eq(True) & of_errors["worse"].eq(False)
-    return np.asarray((both["kind"] == "order") & (change == "worse") & follows.to_numpy())
+    is_near = both["value_before"] - both["value_after"] < NEAR_ORDERS
+    return np.asarray((both["kind"] == "order") & (change == "worse") & is_near & follows.to_numpy())
 
 
 def regressed(found: pd.DataFrame) -> pd.DataFrame:

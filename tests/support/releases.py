@@ -14,8 +14,6 @@ SCENES = [load(name) for name in ("drop-ball", "drop-ball-backspin", "drop-box-c
 SCENES.append(load("spin-asymmetric").model_copy(update={"duration": 5.0}))  # of 30 s: a sixth of the time
 WITH_FLOOR = {"drop-ball", "drop-ball-backspin", "drop-box-corner"}
 TURNING = {"drop-ball-backspin", "drop-box-corner", "fall-spin", "spin-asymmetric"}
-WORSE = TURNING - {"drop-ball-backspin"}
-"""Where releases that turn bodies wrongly have larger errors. Those of the ball happen to be smaller at each step, of a lower order."""
 DTS = [8e-3, 4e-3, 2e-3]
 
 

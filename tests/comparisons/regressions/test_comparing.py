@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.releases import DTS, SCENES, WORSE, Broken, Candidate, WithoutGyroscopicTerm, part, released
+from support.releases import DTS, SCENES, TURNING, Broken, Candidate, WithoutGyroscopicTerm, part, released
 
 from dropspin.comparisons.regressions.changes import speed_changes
 from dropspin.comparisons.regressions.comparing import compare
@@ -26,7 +26,7 @@ def test_changes_of_a_faulty_release_are_attributed_to_it(before, release):
     assert set(found.attributions) == {"candidate"}
     assert found.attributions["candidate"].origin == "engine"
     assert "candidate 1.0 → 1.1" in found.attributions["candidate"].message
-    assert set(found.regressions["scene"]) == WORSE
+    assert set(found.regressions["scene"]) == TURNING
     back = compare(faulty, before)
     assert set(back.of("better")["engine"]) == {"candidate"}
 

@@ -36,14 +36,23 @@ def test_kinds_of_change(old, new, tolerance, kind):
     assert change == expected
 
 
-@pytest.mark.parametrize(("errors", "change"), [((0.5, 0.5), "lower"), ((0.5, 1.0), "lower"), ((1.0, 1.0), "worse"), ((0.5, 1.5), "worse")])
-def test_order_that_is_lower_because_errors_are_better_is_not_worse(errors, change):
+@pytest.mark.parametrize(
+    ("errors", "order", "change"),
+    [
+        ((0.5, 0.5), 0.995, "lower"),
+        ((0.5, 1.0), 0.995, "lower"),
+        ((0.5, 0.5), 0.85, "worse"),
+        ((1.0, 1.0), 0.995, "worse"),
+        ((0.5, 1.5), 0.995, "worse"),
+    ],
+)
+def test_order_that_is_a_little_lower_because_errors_are_better_is_not_worse(errors, order, change):
     def results(values, order):
         rows = [{"steps": steps, "kind": "truth", "value": value} for steps, value in zip(("0.002", "0.001"), values, strict=True)]
         rows.append({"steps": "0.002, 0.001", "kind": "order", "value": order})
         return pd.DataFrame([dict.fromkeys(KEY, "x") | {"tolerance": 1e-9, "unit": "1"} | row for row in rows])
 
-    found = changes(results((1.0, 1.0), 1.0), results(errors, 0.995))
+    found = changes(results((1.0, 1.0), 1.0), results(errors, order))
     assert found.set_index("kind")["change"]["order"] == change
 
 

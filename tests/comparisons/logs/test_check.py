@@ -115,6 +115,7 @@ def with_rests(log: Log) -> Log:
 ORDER, DIRECTION = {"quaternion": "wxyz"}, {"rotation": "world-to-body"}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("change", "causes"),
     [
@@ -410,6 +411,7 @@ def test_orientations_of_a_body_that_turns_too_fast_for_the_frames_are_no_other_
     assert [finding.kind for finding in log_check(log).findings] == ["rotation"]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("spin", [0.0, 0.2])
 def test_spins_that_differ_by_their_noise_agree(spin: float) -> None:
     """Of bodies that do not turn, or hardly, the noise is as large as the spin, or infinitely larger."""
@@ -468,6 +470,7 @@ def test_bodies_that_fly_below_the_floor_are_a_finding_without_rests() -> None:
     assert 1.5 < found.value < 2.5
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("frame", "angle"), [(0, 0.1), (20, 1.2)])
 def test_a_wrong_orientation_is_named_and_changes_no_inertia(frame: int, angle: float) -> None:
     log = made(1, 3, NOISE, durations=(0.3, 0.4)).log

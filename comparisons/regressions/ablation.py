@@ -24,9 +24,6 @@ from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.start_phases import StartPhase
 from dropspin.scenarios import truth_for
 
-MOST = 0.5
-"""Share of a change that reverting settings takes away, at least: it is known roughly, from few starts."""
-
 
 def with_explaining_settings(checked: Checked, baseline: Baseline | None, *, imports: bool) -> Checked:
     """A check with rows of kind `setting` for each engine of which settings changed since its results were accepted, and results fail.
@@ -63,9 +60,6 @@ def _rows(changed: "pd.Series[Any]", results: Results, baseline: Baseline, impor
     entry = engine_entry(replace(engine, options={**engine.options, **{name: now[name] for name in back}}))
     with EngineProcesses(ResourceLimits()) as processes:
         error_of = EngineStudy(StartPhase(scene, truth_for(scene)), entry, processes, ignore).error_of(metric, dt)
-        reverted = replace(entry.adapter, options={**entry.adapter.options, **back})
-        change, undone = changed["value"] - changed["before"], error_of(entry.adapter) - error_of(reverted)
-        if not undone / change >= MOST:
-            return
-        for names, share in explaining(entry.adapter, back, error_of, back).items():
+        change = changed["value"] - changed["before"]
+        for names, share in explaining(entry.adapter, back, error_of, back, change).items():
             yield Case(scene.name, label, dt).measurement("setting", metric.name, "1", Judgement(share, "measured"), names)

@@ -80,9 +80,7 @@ def compare(old: Results, new: Results) -> Changes:
         DropspinError: The runs have no scene, engine and time step in common, or one of them was made with `quick`.
     """
     verify_comparable(old, new)
-    other = [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
-    before, after = asked_for(comparable_results(old), new), asked_for(comparable_results(new), old)
-    found = most_changed_first(changes(*(rows[~rows["scene"].isin(other)] for rows in (before, after))))
+    other, found = _changed_scenes(old, new), _in_common(old, new)
     if found.empty:
         why = f"{', '.join(other)} changed between them" if other else "no scene, engine and time step was requested in both"
         raise DropspinError(f"the runs have no result in common: {why}.")
@@ -90,6 +88,17 @@ def compare(old: Results, new: Results) -> Changes:
     attributions = {str(engine): _attributed(rows, old, new, str(engine), unmoved) for engine, rows in changed}
     around = list(surroundings(old.provenance, new.provenance).values())
     return Changes(found, attributions, around, other, _in_one_only(old, new), speed_changes(old, new), equal_motions(old, new, other))
+
+
+def _changed_scenes(old: Results, new: Results) -> list[str]:
+    """The scenes of both runs whose definitions differ."""
+    return [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
+
+
+def _in_common(old: Results, new: Results) -> pd.DataFrame:
+    """What was requested in both runs, in scenes that have not changed, compared."""
+    asked = asked_for(comparable_results(old), new), asked_for(comparable_results(new), old)
+    return most_changed_first(changes(*(rows[~rows["scene"].isin(_changed_scenes(old, new))] for rows in asked)))
 
 
 def _unmoved(found: pd.DataFrame) -> list[str]:
@@ -208,8 +217,8 @@ def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> li
             held[engine] = pd.concat([earlier.drop(before.index), kept, fresh], ignore_index=True)
         for engine, differing in moved.items():
             for number, rows in _since(differing, results_of[:run], results_of[run]):
-                unmoved = _unmoved(compare(results[number], one).results)
-                found.append(Move(engine, number, run, rows, _attributed(rows, results[number], one, engine, unmoved)))
+                cause = _attributed(rows, results[number], one, engine, _unmoved(_in_common(results[number], one)))
+                found.append(Move(engine, number, run, rows, cause))
     return found
 
 

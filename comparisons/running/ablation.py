@@ -24,16 +24,19 @@ ENOUGH = 0.9
 """Share of an error that explains it."""
 NOTEWORTHY = 1e-3
 """Least share that is stated."""
+MOST = 0.5
+"""Share of a change that reverting settings takes away, at least: it is known roughly, from few starts."""
 ADDITIVE = 0.02
 """Largest difference between the share of two settings and the sum of theirs where each has its own."""
 
 
-def shares(error: Callable[[Reverted], float], changed: Sequence[str]) -> dict[tuple[str, ...], float]:
+def shares(error: Callable[[Reverted], float], changed: Sequence[str], change: float = 0.0) -> dict[tuple[str, ...], float]:
     """The settings that explain an error.
 
     Args:
         error: The error with some settings reverted; NaN if it is undefined.
         changed: The names of all settings that were changed.
+        change: A change of the error, of which reverting all of them takes most away if they explain it.
 
     Returns:
         The share of one setting, and that which a second one adds to it; or of two together, by both names, where their own shares do not
@@ -42,11 +45,12 @@ def shares(error: Callable[[Reverted], float], changed: Sequence[str]) -> dict[t
     """
     error = cache(error)
     whole, calibrated = error(frozenset()), error(frozenset(changed))
-    if not abs(whole - calibrated) > 0.0:
+    undone = whole - calibrated
+    if not abs(undone) > 0.0 or undone * change < MOST * change**2:
         return {}
 
     def share(*names: str) -> float:
-        left = (error(frozenset(names)) - calibrated) / (whole - calibrated)
+        left = (error(frozenset(names)) - calibrated) / undone
         return 1.0 - left if math.isfinite(left) else -math.inf
 
     def explained(*names: str) -> float:
@@ -77,7 +81,11 @@ def shares(error: Callable[[Reverted], float], changed: Sequence[str]) -> dict[t
 
 
 def explaining(
-    engine: Engine, changed: Collection[str], error_of: Callable[[Engine], float], back: Mapping[str, str] = MappingProxyType({})
+    engine: Engine,
+    changed: Collection[str],
+    error_of: Callable[[Engine], float],
+    back: Mapping[str, str] = MappingProxyType({}),
+    change: float = 0.0,
 ) -> dict[str, float]:
     """The changed options of an engine that explain its error: `shares` by option and value, such as `linearDamping=0.04`.
 
@@ -86,6 +94,7 @@ def explaining(
         changed: Their names.
         error_of: The error of an engine; NaN if it is undefined.
         back: The values to which they are reverted; the others are left out.
+        change: As of `shares`.
     """
 
     def error(names: Reverted) -> float:
@@ -95,7 +104,7 @@ def explaining(
         except DropspinError:  # one of two settings that can be given together only
             return math.nan
 
-    found = shares(error, list(changed))
+    found = shares(error, list(changed), change)
     return {", ".join(f"{name}={engine.options[name]}" for name in names): share for names, share in found.items()}
 
 

@@ -225,7 +225,7 @@ def test_result_worse_than_accepted_fails(repository):
     done.stdout.fnmatch_lines(
         [
             "E * faulty: accepted angular_momentum_error at 0.004 s is 0.001, expected -1e-06 … 0.000101",
-            "E * accepted 0.0001 ± 1e-06 on 2026-01-31, first measured; worse by 900 times its tolerance",
+            "E * accepted 0.0001 ± 1e-06 on 2026-01-31, first measured; worse by 0.0009, 900 times its tolerance",
             "E * Reproduce: dropspin run spin-principal -e engines:Faulty --dt 0.004 --baseline base.toml -o out/again",
             "E * If this change is intended: dropspin accept .pytest_cache/d/dropspin/spin-principal-* "
             '--baseline base.toml --known-failures --reason "…"',

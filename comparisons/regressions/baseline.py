@@ -105,7 +105,7 @@ class _File(Table):
     format: Literal[3]
     accepted: dict[str, dict[str, Any]] = Field(default_factory=dict)
     engines: dict[Text, Text] = Field(default_factory=dict)
-    scenes: dict[Text, Text] = Field(default_factory=dict)
+    scenes: dict[Text, Text | dict[Text, Text]] = Field(default_factory=dict)
     motions: dict[str, dict[Text, dict[Text, dict[str, Text]]]] = Field(default_factory=dict)
     results: dict[Text, dict[Text, dict[str, dict[str, Any]]]] = Field(default_factory=dict)
 
@@ -124,7 +124,7 @@ class Baseline:
     Attributes:
         acceptances: The acceptances by key, each with its date, reason and versions.
         engines: By label, the name by which an engine is run, such as `my_module:MyEngine`, if it differs from the label.
-        scenes: For each scene, the hash of everything that affects its motion.
+        scenes: For each acceptance and scene, the hash of everything that affects the motion.
         motions: For each acceptance, scene, engine and time step, the hash of the motions from which the results were computed.
         results: The table that `comparable_results` returns, with two more columns: `by` is the key of the acceptance; if `known_failure`
             is true, a failed check of this result does not fail the run unless the result is worse than accepted.
@@ -132,7 +132,7 @@ class Baseline:
 
     acceptances: Mapping[str, Acceptance] = field(default_factory=dict)
     engines: Mapping[str, str] = field(default_factory=dict)
-    scenes: Mapping[str, str] = field(default_factory=dict)
+    scenes: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     motions: Mapping[str, Digests] = field(default_factory=dict)
     results: pd.DataFrame = field(default_factory=lambda: _table([]))
 
@@ -172,21 +172,21 @@ def load_baseline(path: str | Path) -> Baseline:
         )
     written = validated(_File, where, content)
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
+    for_all = {name: one for name, one in written.scenes.items() if isinstance(one, str)}  # older files have no hashes by acceptance
+    scenes = {key: for_all | one for key in acceptances if not isinstance(one := written.scenes.get(key, {}), str)}
     for scene, of_scene in written.results.items():
-        if scene not in written.scenes:
-            raise DropspinError(f"{where}: scenes: {scene!r} has results, but no digest; remove its results, and accept them again.")
         if len({*map(current_label, of_scene)}) < len(of_scene):
             raise DropspinError(f"{where}: results of {scene}: an engine is listed by two names; remove the lines of the earlier one.")
-    rows = [_row(where, keys, content, acceptances) for keys, content in leaves(written.results, 4)]
+    rows = [_row(where, keys, content, scenes) for keys, content in leaves(written.results, 4)]
     motions: dict[str, dict[tuple[str, str, str], str]] = {}
     for (by, scene, engine, step), digest_of_motions in leaves(written.motions, 4):
         _verify_steps(f"{where}: motions of {scene}, {engine}", step)
         motions.setdefault(by, {})[scene, current_label(engine), step] = digest_of_motions
     engines = {current_label(label): name for label, name in written.engines.items()}
-    return Baseline(acceptances, engines, written.scenes, motions, _table(rows))
+    return Baseline(acceptances, engines, scenes, motions, _table(rows))
 
 
-def _row(where: str, keys: tuple[str, ...], content: Any, acceptances: Mapping[str, Acceptance]) -> dict[str, Any]:
+def _row(where: str, keys: tuple[str, ...], content: Any, scenes: Mapping[str, Mapping[str, str]]) -> dict[str, Any]:
     """A result of a file as a row of a table."""
     scene, engine, steps, name = keys
     _verify_steps(f"{where}: results of {scene}, {engine}", steps)
@@ -195,8 +195,10 @@ def _row(where: str, keys: tuple[str, ...], content: Any, acceptances: Mapping[s
         raise DropspinError(f"{here}: no such result.{did_you_mean(name, NAMES)}")
     metric, kind = NAMES.get(name, (name, kind_of(name)))
     line = validated(_Line, here, content)
-    if line.by not in acceptances:
-        raise DropspinError(f"{here}: by: got {line.by!r}; accepted are {', '.join(acceptances) or 'none'}.")
+    if line.by not in scenes:
+        raise DropspinError(f"{here}: by: got {line.by!r}; accepted are {', '.join(scenes) or 'none'}.")
+    if scene not in scenes[line.by]:
+        raise DropspinError(f"{where}: scenes.{line.by}: {scene!r} has results, but no hash; remove its results, and accept them again.")
     unit = "1" if kind in ("order", *OF_SYMMETRIES) else (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
     identity = dict(zip(KEY, (scene, current_label(engine), steps, metric, kind), strict=True))
     return identity | line.model_dump() | {"unit": unit}
@@ -238,13 +240,13 @@ def write_baseline(baseline: Baseline, path: str | Path) -> None:
 def _text(baseline: Baseline) -> str:
     """The content of the file, in an order that depends only on the content."""
     held = baseline.results.sort_values(KEY)
-    engines, scenes = set(held["engine"]), set(held["scene"])
+    engines, scenes = set(held["engine"]), {*zip(held["by"], held["scene"], strict=True)}
     lines = [*(f"# {line}" for line in HEADER), "", f"format = {FORMAT}", ""]
     for key, one in sorted(baseline.acceptances.items(), key=lambda item: (item[1].date, item[0])):
         lines.append(_assigned(["accepted", key], {name: content for name, content in one.model_dump().items() if content}))
     lines.append("")
-    for table, named, used in (("engines", baseline.engines, engines), ("scenes", baseline.scenes, scenes)):
-        lines += [_assigned([table, name], text) for name, text in sorted(named.items()) if name in used]
+    lines += [_assigned(["engines", name], text) for name, text in sorted(baseline.engines.items()) if name in engines]
+    lines += [_assigned(["scenes", by, scene], baseline.scenes[by][scene]) for by, scene in sorted(scenes)]
     cases = {(row["by"], row["scene"], row["engine"], step) for row in held.to_dict("records") for step in row["steps"].split(", ")}
     measured = {(by, *case): digest for by, digests in baseline.motions.items() for case, digest in digests.items()}
     lines += [_assigned(["motions", *key], measured[key]) for key in sorted(cases & measured.keys())]

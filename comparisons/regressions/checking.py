@@ -111,11 +111,12 @@ def accept(
     outside = earlier.results.drop(covered.index)
     is_of_another_scene = _has_other_scene(outside, earlier, results)
     table = pd.concat([outside[~is_of_another_scene], kept, moved], ignore_index=True)[list(COLUMNS)]
+    scenes = {name: scene.digest for name, scene in results.scenes.items()}
     every = {acceptance.key: acceptance, **earlier.acceptances}
     accepted = Baseline(
         {key: one for key, one in every.items() if key in set(table["by"])},
         {**earlier.engines, **{label: name for label, name in stamp["names"].items() if name != label}},
-        {**earlier.scenes, **{name: scene.digest for name, scene in results.scenes.items()}},
+        {**earlier.scenes, acceptance.key: {**earlier.scenes.get(acceptance.key, {}), **scenes}},
         {**earlier.motions, acceptance.key: {**earlier.motions.get(acceptance.key, {}), **digests_of(stamp)}},
         table,
     )
@@ -157,7 +158,7 @@ def check(results: Results, baseline: Baseline | str | Path | None = None) -> Ch
         )
     of_other_scenes = _has_other_scene(accepted, baseline, results)
     measured = comparable_results(results)
-    comparable = measured[~measured["scene"].isin(accepted.loc[of_other_scenes, "scene"])]
+    comparable = measured[~_keys(measured).isin(_keys(accepted[of_other_scenes]))]
     found = changes(accepted[~of_other_scenes], comparable).merge(accepted[[*KEY, "by", "known_failure"]], on=KEY, how="left")
     found = most_changed_first(found)
     causes = _causes(found, baseline, results)
@@ -170,7 +171,8 @@ def check(results: Results, baseline: Baseline | str | Path | None = None) -> Ch
     rows += _lost_rows(results, noted[noted["change"].isin(LOST)])
     for row in noted[~noted["change"].isin(["new", *LOST])].to_dict("records"):
         by = baseline.acceptances[row["by"]]
-        away = "" if row["change"] == "same" else f"; {row['change']} by {row['in_tolerances']:,.3g} times its tolerance"
+        by_how_much = f"{abs(row['value'] - row['before']):.3g}, {row['in_tolerances']:,.3g} times its tolerance"
+        away = "" if row["change"] == "same" else f"; {row['change']} by {by_how_much}"
         reason = f"accepted {row['before']:.6g} ± {row['tolerance']:.2g} on {by.date}, {by.reason}{away}{row['note']}"
         lower, upper = (row[name] if np.isfinite(row[name]) else np.nan for name in ("lower", "upper"))
         rows.append(_row(row, VERDICTS[row["change"]], reason, value=row["value"], lower=lower, upper=upper))
@@ -181,8 +183,9 @@ def check(results: Results, baseline: Baseline | str | Path | None = None) -> Ch
 
 def _has_other_scene(rows: pd.DataFrame, baseline: Baseline, results: Results) -> "pd.Series[bool]":
     """Whether each accepted result is of a scene that is another one in a run."""
-    digests = {name: scene.digest for name, scene in results.scenes.items()}
-    return rows["scene"].map(lambda name: baseline.scenes[name] != digests.get(name, baseline.scenes[name])).astype(bool)
+    pairs = zip(rows["by"], rows["scene"], strict=True)
+    differ = [scene in results.scenes and baseline.scenes[by][scene] != results.scenes[scene].digest for by, scene in pairs]
+    return pd.Series(differ, rows.index, dtype=bool)
 
 
 def _keys(rows: pd.DataFrame) -> pd.MultiIndex:

@@ -67,10 +67,15 @@ def _row(row: Row, count: int) -> dict[str, str]:
         "scene": row["scene"],
         "engine": row["engine"],
         **change_cells(row),
-        "ratio": f"{ratio:.3g}" if math.isfinite(ratio) else "–",
+        "ratio": _ratio(ratio) if math.isfinite(ratio) else "–",
         "tolerances": "–" if math.isnan(row["in_tolerances"]) else f"{row['in_tolerances']:.3g}",
         "others": counted(count - 1, "other result") if count > 1 else "–",
     }
+
+
+def _ratio(ratio: float) -> str:
+    """A ratio to three digits; of one near 1, those of its difference from 1."""
+    return f"1 {'−' if ratio < 1.0 else '+'} {abs(ratio - 1.0):.2g}" if f"{ratio:.3g}" == "1" and ratio != 1.0 else f"{ratio:.3g}"
 
 
 def _notes(changes: Changes) -> list[str]:

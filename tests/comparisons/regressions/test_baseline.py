@@ -122,6 +122,27 @@ def test_results_of_a_changed_scene_are_replaced_for_every_engine(longer_fall, a
     assert "fall-spin with mujoco" in said
 
 
+def test_scenes_of_older_files_are_those_of_every_acceptance(accepted, tmp_path):
+    write_baseline(accepted, tmp_path / "new.toml")
+    older = re.sub(r"^scenes\.\w+\.", "scenes.", (tmp_path / "new.toml").read_text(), flags=re.MULTILINE)
+    (tmp_path / "old.toml").write_text(older)
+    assert load_baseline(tmp_path / "old.toml").scenes == load_baseline(tmp_path / "new.toml").scenes
+
+
+def test_merge_of_two_definitions_of_a_scene_is_seen(before, longer_fall, tmp_path):
+    """One branch accepts another engine, the other branch changes the scene: the results of each are compared with their own scene."""
+    base = accept(part(before, engines=["candidate"]), Baseline(), "first", TODAY)[0]
+    mine = accept(part(before, engines=["mujoco"]), base, "MuJoCo too", TODAY)[0]
+    theirs = accept(part(longer_fall, engines=["candidate"]), base, "longer", TODAY)[0]
+    added = mine.results[mine.results["engine"] == "mujoco"]
+    table = pd.concat([theirs.results, added], ignore_index=True)
+    merged = Baseline({**mine.acceptances, **theirs.acceptances}, {}, {**mine.scenes, **theirs.scenes}, {}, table)
+    write_baseline(merged, tmp_path / "merged.toml")
+    judged = check(longer_fall, tmp_path / "merged.toml").results.table.query("kind == 'baseline'")
+    assert set(judged.query("engine == 'candidate'")["verdict"]) == {"passed"}
+    assert [*judged.query("engine == 'mujoco'")["basis"]] == ["scene_changed"]
+
+
 def with_reasons(baseline):
     return [(row, baseline.acceptances[row["by"]].reason) for row in baseline.results.to_dict("records")]
 
@@ -163,10 +184,10 @@ def test_union_merge_keeps_what_two_branches_accepted(release, numpy, tmp_path):
         (lambda text: text.replace('"0.004"', '"4e-3"', 1), "write it as '0.004'"),
         (lambda text: text.replace('"0.004"', '"fast"', 1), "'fast' is not a time step or a list of them; write seconds, such as '0.004'."),
         (
-            lambda text: text.replace("scenes.drop-ball =", "scene.drop-ball ="),
+            lambda text: re.sub(r"^scenes(\.\w+\.drop-ball) =", r"scene\1 =", text, flags=re.MULTILINE),
             "scene: unknown key. Allowed: format, accepted, engines, scenes, motions, results",
         ),
-        (lambda text: re.sub("^scenes.drop-ball.*$", "", text, flags=re.MULTILINE), "scenes: 'drop-ball' has results, but no digest"),
+        (lambda text: re.sub(r"(?m)^scenes\.\w+\.drop-ball =.*$", "", text), "scenes.KEY: 'drop-ball' has results, but no hash"),
         (lambda text: text.replace(", versions = ", ", version = ", 1), "accepted.KEY: version: unknown key. "),
         (lambda text: text + text.splitlines()[-1], "accepted.toml: not TOML: Cannot overwrite a value"),
         (lambda text: text[: len(text) // 2], "accepted.toml: "),

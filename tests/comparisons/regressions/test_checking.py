@@ -58,7 +58,7 @@ def test_planted_faults_fail_and_are_listed_first(release, accepted, planted, sc
     assert failed["metric"].iloc[0] in metrics
     assert checked.changes["in_tolerances"].iloc[0] > 1e4
     assert checked.results.exit_code() == 1
-    assert re.match(r"accepted \S+ ± \S+ on 2026-03-01, first measured; worse by \S+ times its tolerance", failed["reason"].iloc[0])
+    assert re.match(r"accepted \S+ ± \S+ on 2026-03-01, first measured; worse by \S+, \S+ times its tolerance", failed["reason"].iloc[0])
 
 
 def test_missing_gyroscopic_term_is_listed_first_in_the_tumble(release, accepted):

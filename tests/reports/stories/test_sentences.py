@@ -131,3 +131,9 @@ def modelled(**tables):
 )  # fmt: skip
 def test_sentence(sentence, expected):
     assert sentence == expected
+
+
+@pytest.mark.parametrize(("now", "ratio"), [(2.0, "0.5"), (4.0000002, "1 + 5e-08"), (3.999, "1 − 0.00025"), (4.4, "1.1"), (-4.0, "1")])
+def test_values_that_look_equal_have_another_ratio(now, ratio):
+    row = {"scene": "ball", "engine": "mine", "metric": "energy_error", "kind": "truth", "steps": "0.004", "tolerance": 1e-9}
+    assert compare._row(row | {"before": 4.0, "value": now, "in_tolerances": 2.0}, 1)["ratio"] == ratio

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from dropspin.comparisons.regressions.checking import accept as accept
     from dropspin.comparisons.regressions.checking import check as check
     from dropspin.comparisons.regressions.comparing import compare as compare
-    from dropspin.comparisons.regressions.comparing import history as history
+    from dropspin.comparisons.regressions.history import history as history
     from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS as ENSEMBLE_METRICS
     from dropspin.comparisons.results.results import Results as Results
     from dropspin.comparisons.results.store import load_results as load_results

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from dropspin.comparisons.regressions.comparing import History
+from dropspin.comparisons.regressions.history import History
 from dropspin.comparisons.results.complete_folders import SECTION, file_name, read_stored, study_folder
 from dropspin.reports.document import Charts, Document
 from dropspin.reports.markdown import markdown

@@ -11,11 +11,12 @@ import mujoco
 import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import Changes
+from dropspin.comparisons.diagnosis.mjcf_defaults import option_setting
 from dropspin.comparisons.diagnosis.mujoco_compiled import placed
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of
 from dropspin.comparisons.diagnosis.mujoco_recompiled import LEAST, Recompiled
 from dropspin.comparisons.diagnosis.mujoco_shapes import ALONG, distance_to, kind_of
-from dropspin.comparisons.diagnosis.source import option_setting, read_source
+from dropspin.comparisons.diagnosis.source import read_source
 from dropspin.comparisons.diagnosis.urdf_file import package_remedy, verify_one_root
 from dropspin.comparisons.engines.mujoco_simulation import quiet
 from dropspin.scenarios import DropspinError

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import MassProperties
+from dropspin.comparisons.diagnosis.mjcf_defaults import mjcf_setting, option_setting
 from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
 from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
 from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, pair_element
 from dropspin.comparisons.diagnosis.mujoco_file import MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL
-from dropspin.comparisons.diagnosis.source import Element, Setting, mjcf_setting, option_setting, tagged
+from dropspin.comparisons.diagnosis.source import Element, Setting, tagged
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array

@@ -1,13 +1,12 @@
-"""Two runs compared, and histories of runs: the results that changed, and the causes to which the changes are attributed."""
+"""Two runs compared: the results that changed, and the causes to which the changes are attributed."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import pandas as pd
 
 from dropspin.comparisons.regressions.attribution import Attribution, attribute, surroundings
 from dropspin.comparisons.regressions.changes import (
-    KEY,
     EqualMotions,
     Motion,
     SpeedChange,
@@ -22,12 +21,8 @@ from dropspin.comparisons.regressions.changes import (
     speed_changes,
     verify_comparable,
 )
-from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.scenarios import DropspinError
-
-CHANGED = ["worse", "moved", "better", "gone"]
-"""The kinds of change that a history lists."""
 
 
 class Changes(NamedTuple):
@@ -80,12 +75,12 @@ def compare(old: Results, new: Results) -> Changes:
         DropspinError: The runs have no scene, engine and time step in common, or one of them was made with `quick`.
     """
     verify_comparable(old, new)
-    other, found = _changed_scenes(old, new), _in_common(old, new)
+    other, found = _changed_scenes(old, new), results_in_common(old, new)
     if found.empty:
         why = f"{', '.join(other)} changed between them" if other else "no scene, engine and time step was requested in both"
         raise DropspinError(f"the runs have no result in common: {why}.")
-    changed, unmoved = found[found["change"] != "same"].groupby("engine"), _unmoved(found)
-    attributions = {str(engine): _attributed(rows, old, new, str(engine), unmoved) for engine, rows in changed}
+    changed, unmoved = found[found["change"] != "same"].groupby("engine"), unmoved_engines(found)
+    attributions = {str(engine): attributed(rows, old, new, str(engine), unmoved) for engine, rows in changed}
     around = list(surroundings(old.provenance, new.provenance).values())
     return Changes(found, attributions, around, other, _in_one_only(old, new), speed_changes(old, new), equal_motions(old, new, other))
 
@@ -95,18 +90,18 @@ def _changed_scenes(old: Results, new: Results) -> list[str]:
     return [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
 
 
-def _in_common(old: Results, new: Results) -> pd.DataFrame:
+def results_in_common(old: Results, new: Results) -> pd.DataFrame:
     """What was requested in both runs, in scenes that have not changed, compared."""
     asked = asked_for(comparable_results(old), new), asked_for(comparable_results(new), old)
     return most_changed_first(changes(*(rows[~rows["scene"].isin(_changed_scenes(old, new))] for rows in asked)))
 
 
-def _unmoved(found: pd.DataFrame) -> list[str]:
+def unmoved_engines(found: pd.DataFrame) -> list[str]:
     """The engines whose results are all the same."""
     return [str(engine) for engine, kinds in found.groupby("engine")["change"] if set(kinds) == {"same"}]
 
 
-def _attributed(rows: pd.DataFrame, old: Results, new: Results, engine: str, unmoved: Sequence[str]) -> Attribution:
+def attributed(rows: pd.DataFrame, old: Results, new: Results, engine: str, unmoved: Sequence[str]) -> Attribution:
     """The cause to which changed results of an engine are attributed; its motions differ if those of one result do."""
     stamps = old.provenance, new.provenance
     digests = [digests_of(stamp) for stamp in stamps]
@@ -124,114 +119,3 @@ def _in_one_only(old: Results, new: Results) -> list[str]:
         for thing in things
         if thing not in others
     ]
-
-
-class Move(NamedTuple):
-    """A run in which results of an engine changed.
-
-    Attributes:
-        engine: Label of the engine.
-        before: Number of the last earlier run from which these results differ by more than their tolerance.
-        run: Number of the run in which the results changed.
-        results: The changes (worse, better, moved or gone) since then that `changes.changes` returns, largest first.
-        attribution: The cause to which the changes are attributed.
-    """
-
-    engine: str
-    before: int
-    run: int
-    results: pd.DataFrame
-    attribution: Attribution
-
-
-class History(NamedTuple):
-    """The results of several runs in the order of their start times.
-
-    Attributes:
-        names: Names of the runs.
-        stamps: Time, commit and versions of each run.
-        results: The comparable results of all runs; the column `run` is the number of the run.
-        moves: The changes, in the order of the runs.
-    """
-
-    names: list[str]
-    stamps: pd.DataFrame
-    results: pd.DataFrame
-    moves: list[Move]
-
-
-def history(runs: Mapping[str, Results]) -> History:
-    """Compare the results of several runs over time.
-
-    Args:
-        runs: Two or more runs, by name; they are sorted by start time.
-
-    Returns:
-        `names` of the runs in order; `stamps`, their times, commits and versions; `results`, the values of all runs; and `moves`, the
-        runs in which results changed, and the cause to which each change is attributed.
-
-    Raises:
-        DropspinError: There are fewer than two runs, or one of them was made with `quick`.
-    """
-    if len(runs) < 2:
-        raise DropspinError(f"a history needs two or more runs, got {len(runs)}; give more, or a folder of runs.")
-    verify_comparable(*runs.values())
-    ordered = sorted(runs.items(), key=lambda item: str(item[1].provenance["started"]))
-    names, results = [name for name, _ in ordered], [one for _, one in ordered]
-    stamps = [
-        {"run": name, "started": one.provenance["started"], "commit": one.provenance["commit"]} | versions_behind(one.provenance)
-        for name, one in ordered
-    ]
-    measured = list(map(comparable_results, results))
-    every = pd.concat([rows.assign(run=number) for number, rows in enumerate(measured)], ignore_index=True)
-    return History(names, pd.DataFrame(stamps), every, _moves(results, measured))
-
-
-def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> list[Move]:
-    """The runs in which results changed.
-
-    Each result is compared with its value after its last change, so that slow drifts are found. Runs that did not request the result have
-    no effect; in the first one in which the engine broke down or declined the scene, it is gone.
-    """
-    held: dict[str, pd.DataFrame] = {}
-    scenes: dict[str, str] = {}
-    absent: dict[str, list[tuple[str, ...]]] = {}
-    found = []
-    for run, one in enumerate(results):
-        digests = {name: scene.digest for name, scene in one.scenes.items()}
-        other = {name for name, digest in digests.items() if scenes.get(name, digest) != digest}
-        scenes |= digests
-        held = {engine: rows[~rows["scene"].isin(other)] for engine, rows in held.items()}
-        moved = {}
-        for engine in one.engines:
-            now = results_of[run][results_of[run]["engine"] == engine]
-            earlier = held.get(engine, now.iloc[:0])
-            before = asked_for(earlier, one)
-            change = changes(before, now)
-            keys, is_gone = pd.MultiIndex.from_frame(change[KEY]), change["change"] == "gone"
-            was_gone = is_gone & keys.isin(absent.get(engine, []))
-            absent[engine] = [*set(absent.get(engine, [])).difference(keys), *keys[is_gone]]
-            moved[engine] = change.loc[change["change"].isin(CHANGED) & ~was_gone, KEY]
-            stays = change["change"].isin(["same", "gone", "undefined"])
-            kept, fresh = before.merge(change.loc[stays, KEY], on=KEY), now.merge(change.loc[~stays, KEY], on=KEY)
-            held[engine] = pd.concat([earlier.drop(before.index), kept, fresh], ignore_index=True)
-        for engine, differing in moved.items():
-            for number, rows in _since(differing, results_of[:run], results_of[run]):
-                cause = _attributed(rows, results[number], one, engine, _unmoved(_in_common(results[number], one)))
-                found.append(Move(engine, number, run, rows, cause))
-    return found
-
-
-def _since(keys: pd.DataFrame, earlier: Sequence[pd.DataFrame], now: pd.DataFrame) -> Iterator[tuple[int, pd.DataFrame]]:
-    """The changes of some results, each since the last earlier run from which it differs by more than its tolerance, by these runs.
-
-    Of a slow drift that is not the run before, which alone may not have caused the change.
-    """
-    for number, rows in reversed(list(enumerate(earlier))):
-        found = changes(rows.merge(keys, on=KEY), now.merge(keys, on=KEY))
-        found = found[found["change"].isin(CHANGED)]
-        if len(found):
-            yield number, most_changed_first(found)
-            keys = keys[~pd.MultiIndex.from_frame(keys).isin(pd.MultiIndex.from_frame(found[KEY]))]
-        if keys.empty:
-            return

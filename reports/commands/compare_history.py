@@ -22,7 +22,7 @@ def compare_history_command(runs: tuple[str, ...], output: str, json_output: boo
 
     RUN is a folder that dropspin run -o wrote, or a folder of such folders. Runs are sorted by start time.
     """
-    from dropspin.comparisons.regressions.comparing import history
+    from dropspin.comparisons.regressions.history import history
     from dropspin.comparisons.results.complete_folders import study_folder
     from dropspin.reports.stories.history import rows
     from dropspin.reports.study_files import write_history

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dropspin.comparisons.regressions.comparing import History
+from dropspin.comparisons.regressions.history import History
 from dropspin.reports.plots.chart import Chart, Line, draw
 from dropspin.reports.plots.colours import engine_styles
 from dropspin.reports.plots.style import metric_label, plain

@@ -1,6 +1,6 @@
 """The output of `dropspin compare history`: the runs in which results changed."""
 
-from dropspin.comparisons.regressions.comparing import History
+from dropspin.comparisons.regressions.history import History
 from dropspin.reports.document import Charts, Document, Heading, Part, Rows, Sentences, Table
 from dropspin.reports.plots.history import result_over_runs
 from dropspin.reports.stories.compare import change_cells

@@ -15,7 +15,8 @@ from dropspin.comparisons.engines.mapping import EXPLICIT_GYROSCOPIC, IMPLICIT_G
 from dropspin.comparisons.engines.mujoco_engine import flight_of
 from dropspin.comparisons.engines.packages import numbers_of
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.regressions.comparing import compare, history
+from dropspin.comparisons.regressions.comparing import compare
+from dropspin.comparisons.regressions.history import history
 from dropspin.comparisons.results.store import load_results
 from dropspin.comparisons.running.driving import simulate
 from dropspin.scenarios.mechanics import kinetic_energy

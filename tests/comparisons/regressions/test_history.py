@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from support.releases import TURNING, Broken, Candidate, Euler, part, released
 
-from dropspin.comparisons.regressions.comparing import history
+from dropspin.comparisons.regressions.history import history
 from dropspin.scenarios import DropspinError
 
 

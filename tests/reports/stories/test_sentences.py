@@ -11,7 +11,8 @@ from dropspin.comparisons.record.findings import Case, Change
 from dropspin.comparisons.record.rerun import Again
 from dropspin.comparisons.regressions.attribution import Attribution
 from dropspin.comparisons.regressions.changes import EqualMotions, SpeedChange
-from dropspin.comparisons.regressions.comparing import Changes, History
+from dropspin.comparisons.regressions.comparing import Changes
+from dropspin.comparisons.regressions.history import History
 from dropspin.comparisons.symmetries.findings import Finding
 from dropspin.reports.stories import compare, conform, history, numbers, record, reproduce, rerun, scene, symmetries
 from dropspin.scenarios import load

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dropspin.comparisons.faults.conventions import CONVENTIONS
 from dropspin.comparisons.faults.fault_model import unchanged
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth
-from dropspin.scenarios.rotations import angle_between_orientations, length
+from dropspin.scenarios.rotations import angle_between_orientations, length, rotation_vector
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 from dropspin.scenarios.text import counted
 
@@ -101,15 +101,16 @@ def _of_numbers(motion: Trajectory) -> Iterator[str]:
 
 
 def _of_rates(scene: Scenario, motion: Trajectory) -> Iterator[str]:
-    """Of velocities that are 0, or whose times have another unit, by the change of the positions."""
+    """Of velocities that are 0, or whose times have another unit, by the change of the positions, of a body that stays by its rotation."""
+    by, (_, expected, ratio) = "the velocities and the change of the position", _movements(motion)
     if np.ptp(motion.position, axis=0).max() <= STAYS * scene.body.size:
-        return
-    _, expected, ratio = _movements(motion)
-    if not expected.any():
+        turned = rotation_vector(motion.orientation[:-1], motion.orientation[1:])
+        by, ratio = "the angular velocities and the rotation", _ratio(turned, _expected(motion.t, motion.angular_velocity))
+    elif not expected.any():
         yield "velocities are 0 while the position changes; give the velocity of the centre of mass [m/s]"
     for factor, unit in UNITS_OF_TIME.items():
         if abs(ratio * factor - 1.0) < GROSS:
-            yield f"the times appear to be in {unit}, by the velocities and the change of the position; give them in s"
+            yield f"the times appear to be in {unit}, by {by}; give them in s"
 
 
 def _of_ratios(motion: Trajectory) -> Iterator[str]:
@@ -122,9 +123,17 @@ def _of_ratios(motion: Trajectory) -> Iterator[str]:
 
 def _movements(motion: Trajectory) -> tuple[Array, Array, float]:
     """The change of the position in each step, that by the velocities [m], shape (n - 1, 3), and the ratio of the two; NaN without any."""
-    moved, dt = np.diff(motion.position, axis=0), np.diff(motion.t)[:, None]
-    expected = 0.5 * dt * (motion.velocity[1:] + motion.velocity[:-1])
-    return moved, expected, float(np.sum(moved * expected) / np.sum(expected**2))
+    moved, expected = np.diff(motion.position, axis=0), _expected(motion.t, motion.velocity)
+    return moved, expected, _ratio(moved, expected)
+
+
+def _expected(t: Array, rates: Array) -> Array:
+    """The movement in each step, shape (n - 1, 3), by the rates at its ends, shape (n, 3)."""
+    return 0.5 * np.diff(t)[:, None] * (rates[1:] + rates[:-1])
+
+
+def _ratio(moved: Array, expected: Array) -> float:
+    return float(np.sum(moved * expected) / np.sum(expected**2))
 
 
 def _of_states(scene: Scenario, truth: Truth | None, motion: Trajectory) -> Iterator[str]:

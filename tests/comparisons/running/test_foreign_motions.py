@@ -57,6 +57,7 @@ MISMATCHES = {
     "late times": (BALL, lambda t, rows: (t[100:], rows[100:]), "the times begin at 0.1 s; give the motion from the scene's start on"),
     "milliseconds": (BALL, lambda t, rows: (1e3 * t, rows), "the times appear to be in ms"),
     "microseconds": (FLIGHT.model_copy(update={"start": BALL.start.model_copy(update={"velocity": (1.0, 0.0, 0.0)})}), None, "µs"),
+    "milliseconds of a spin": (FLIGHT, lambda t, rows: (1e3 * t, rows), "the times appear to be in ms, by the angular velocities"),
     "jitter": (BALL, jittered, "the times are not equally spaced: steps are 0.000"),
     "gap": (
         BALL,

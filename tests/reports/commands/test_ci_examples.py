@@ -85,6 +85,16 @@ def test_texts_of_inputs_are_no_commands(tmp_path):
     assert not any("${{" in step["run"] for step in ACTION["runs"]["steps"] if "run" in step)
 
 
+@pytest.mark.parametrize(("complete", "given"), [("true", True), ("false", False)])
+def test_action_can_ask_for_every_accepted_result(complete, given, tmp_path):
+    (tmp_path / "dropspin").write_text("#!/bin/sh\necho $*\n")
+    (tmp_path / "dropspin").chmod(0o755)
+    *_, judge = github_steps(complete=complete)
+    done = run_steps([judge], tmp_path, "good", PATH=f"{tmp_path}{os.pathsep}{HERE}")
+    assert done.stdout.startswith("check out/run --baseline dropspin-baseline.toml --junit out/junit.xml --summary ")
+    assert done.stdout.endswith(" --complete\n") == given
+
+
 def test_actions_of_others_are_named_by_their_commits():
     texts = [path.read_text() for path in (ROOT / "action.yml", *(ROOT / "docs/ci").glob("*.yml"))]
     used = {name for text in texts for name in re.findall(r"uses: (\S+)", text)} - {"OWNER/dropspin@COMMIT"}

@@ -79,7 +79,7 @@ def test_texts_of_inputs_are_no_commands(tmp_path):
     planted = "$(touch planted)`touch planted`'; touch planted; \""
     _, measure, _ = github_steps(engines=planted, scenes=planted, **{"time-steps": planted}, output=f"out{planted}")
     done = run_steps([measure], tmp_path, "good", PATH=HERE)
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "is not a valid float" in done.stderr
     assert list(tmp_path.iterdir()) == []
     assert not any("${{" in step["run"] for step in ACTION["runs"]["steps"] if "run" in step)
@@ -93,6 +93,16 @@ def test_action_can_ask_for_every_accepted_result(complete, given, tmp_path):
     done = run_steps([judge], tmp_path, "good", PATH=f"{tmp_path}{os.pathsep}{HERE}")
     assert done.stdout.startswith("check out/run --baseline dropspin-baseline.toml --junit out/junit.xml --summary ")
     assert done.stdout.endswith(" --complete\n") == given
+
+
+@pytest.mark.parametrize(("code", "judged"), [(0, True), (1, True), (3, True), (2, False), (137, False)])
+def test_action_judges_failed_runs_and_removes_no_files(code, judged, tmp_path):
+    (tmp_path / "dropspin").write_text(f"#!/bin/sh\nexit {code}\n")
+    (tmp_path / "dropspin").chmod(0o755)
+    (tmp_path / "run").mkdir()
+    _, measure, _ = github_steps(output=".")
+    assert run_steps([measure], tmp_path, "good", PATH=f"{tmp_path}{os.pathsep}{HERE}").returncode == (0 if judged else code)
+    assert (tmp_path / "run").is_dir()
 
 
 def test_actions_of_others_are_named_by_their_commits():

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 import pytest
+from support import engines as made
 
 import dropspin as ds
 
@@ -133,6 +134,11 @@ def test_repr_of_an_error_budget_is_a_sentence(errors, start):
     assert (f", the order {found.order:.2f} (" in repr(found)) == np.isfinite(found.order) == (found.cause in ("model", "discretisation"))
 
 
+@pytest.mark.parametrize("dt", [np.float32(0.01), [np.float32(0.01)], np.array([0.01])])
+def test_a_time_step_may_be_a_number_of_numpy(dt):
+    assert ds.run("spin-principal", "wang", dt=dt).table["dt"].dropna().unique() == pytest.approx([0.01])
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -152,6 +158,10 @@ def test_repr_of_an_error_budget_is_a_sentence(errors, start):
         (lambda: ds.run([3], "mujoco"), "scene: got 3 (int); give a name such as 'drop-ball', a file's path, a mapping, or a Scenario."),
         (lambda: ds.run("drop-ball", None), "engines: got None (NoneType); give an Engine, a name such as 'mujoco', or a list of these."),
         (lambda: ds.run("drop-ball", [3]), "engine: got 3 (int); give a name such as 'mujoco', or an Engine."),
+        (
+            lambda: ds.run("drop-ball", made.engine_with("a b", None)),
+            "engine: Distorted.name is 'a b'; give it a name for results, of letters",
+        ),
         (lambda: ds.run("drop-ball", "mujocco"), "engine 'mujocco' is unknown. Did you mean 'mujoco'?"),
         (lambda: ds.run("drop-ball", "mujoco", dt="fast"), "dt: got 'fast' (str); give a number of seconds, or a list of these."),
         (lambda: ds.run("drop-ball", "mujoco", dt=["fast"]), "dt: got 'fast' (str); a time step is a number of seconds."),

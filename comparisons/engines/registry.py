@@ -192,15 +192,23 @@ def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
         raise UnknownName(f"{module_name}'s engine", attribute, known) from None
     if not _is_engine(adapter):
         raise DropspinError(f"engine {name!r}: {attribute} is not an engine; an engine is a class that inherits from dropspin.Engine.")
-    given = getattr(adapter, "name", "")
-    if not isinstance(given, str) or not re.fullmatch(r"[A-Za-z][\w-]*", given, re.ASCII):
-        raise DropspinError(
-            f"engine {name!r}: {attribute}.name is {shown(given)}; "
-            "give it a name for results, of letters, digits, - and _, such as 'my-engine'."
-        )
+    given = verified_name(adapter, f"engine {name!r}: {attribute}")
     if given in BUILT_IN or given in EARLIER_NAMES:
         raise DropspinError(f"engine {name!r}: {attribute}.name is {given!r}, which is a built-in engine; results need another name.")
     return adapter
+
+
+def verified_name(adapter: type[Engine], where: str) -> str:
+    """The name of a class of engines for results.
+
+    Raises:
+        DropspinError: It has none that can stand in a label and in the name of a test.
+    """
+    given = getattr(adapter, "name", "")
+    if not isinstance(given, str) or not re.fullmatch(r"[A-Za-z][\w-]*", given, re.ASCII):
+        why = "give it a name for results, of letters, digits, - and _, such as 'my-engine'"
+        raise DropspinError(f"{where}.name is {shown(given)}; {why}.")
+    return given
 
 
 def _is_engine(found: object) -> bool:

@@ -54,7 +54,7 @@ ONE_OR_SEVERAL = {
 }
 
 
-SINGLE: dict[str, Any] = {"scenes": Scenario | str | Path | Mapping, "engines": Engine | str, "dt": int | float}
+SINGLE: dict[str, Any] = {"scenes": Scenario | str | Path | Mapping, "engines": Engine | str, "dt": int | float | np.floating}
 
 
 def ignore(*arguments: object) -> None:

@@ -135,6 +135,7 @@ def _request(
             raise DropspinError(f"{name}: got none; give at least one.")
     for scene, step in product(chosen, dts):
         verify_time_step(scene, step, len(entries))
+    dts = list(map(float, dts))
     labels = [entry.label for entry in entries]
     requested = [StartPhase(scene, reference_for(scene), quick) for scene in chosen]
     for scene, truth, *_ in requested:
@@ -142,7 +143,7 @@ def _request(
     if len(set(dts)) < len(dts):
         raise DropspinError(f"dt: a time step is given twice ({', '.join(f'{step:g}' for step in dts)}); give each once.")
     names = [scene.name for scene in chosen]
-    asked_for = {"scenes": names, "engines": labels, "dts": list(dts), "time_limit": resources.processor_time, "quick": quick}
+    asked_for = {"scenes": names, "engines": labels, "dts": dts, "time_limit": resources.processor_time, "quick": quick}
     adapters = {entry.label: code_of(entry.engine) for entry in entries if entry.engine is not None}
     by_name = {entry.label: name.strip() for entry, name in zip(entries, asked, strict=True) if isinstance(name, str)}
     return requested, entries, dts, provenance(asked_for) | {"names": by_name, "adapters": adapters}

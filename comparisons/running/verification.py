@@ -46,7 +46,7 @@ def verified_simulation(prepared: Any) -> Simulation:
 def verify_build(engine: Engine, scene: Scenario, simulation: Simulation, dt: float) -> None:
     """Raise `BuildMismatch` unless state, mass, inertia and gravity equal the scene's to 8 eps, a spin to 64, of the engine's precision."""
     verified_lag(simulation.velocity_lag, dt)
-    state = simulation.state()
+    state = numpy_array(simulation.state())
     if state.shape != (13,):
         raise BuildMismatch(f"the state has shape {state.shape}, not (13,)")
     verify_start(engine, scene, state)

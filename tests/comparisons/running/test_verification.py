@@ -5,7 +5,14 @@ import pytest
 from support import engines as made
 
 from dropspin.comparisons.engines.base import BatchSimulation
-from dropspin.comparisons.running.verification import BuildMismatch, verified_batch, verified_record, verify_start, verify_starts
+from dropspin.comparisons.running.verification import (
+    BuildMismatch,
+    verified_batch,
+    verified_record,
+    verify_build,
+    verify_start,
+    verify_starts,
+)
 from dropspin.scenarios import load
 from dropspin.scenarios.model import initial_states
 from dropspin.scenarios.rotations import rotate, unrotate
@@ -45,6 +52,15 @@ def test_a_velocity_that_is_what_rounding_leaves_may_be_rounded_again():
     state[VELOCITY] = [1e-12, 0.0, 0.0]
     with pytest.raises(BuildMismatch, match="velocity at the start"):
         verify_start(made.Exact(), scene, state)
+
+
+def test_a_state_may_be_a_list():
+    class Listed(made.ExactSimulation):
+        def state(self):
+            return super().state().tolist()
+
+    scene = load("spin-principal")
+    verify_build(made.Exact(), scene, Listed(scene, 1e-3), 1e-3)
 
 
 def motions_of_a_batch():

@@ -72,6 +72,7 @@ class Chart:
 
     Attributes:
         x_label, y_label: Labels of the axes, with units.
+        x_name, y_name: What x and y of the lines are, with units, where it is not what the labels say; else empty.
         lines: The lines, in the order they are drawn.
         x_log, y_log: Whether an axis is logarithmic.
         ticks: Positions and texts of the ticks of the x axis; empty for automatic ones.
@@ -97,6 +98,8 @@ class Chart:
     rows: Sequence[str] = ()
     is_map: bool = False
     texts: Sequence[tuple[float, float, str]] = ()
+    x_name: str = ""
+    y_name: str = ""
 
     @property
     def is_flat(self) -> bool:

@@ -25,7 +25,8 @@ def chart_data(chart: Chart) -> dict[str, Any]:
     xs: list[Array] = []
     lines = [_line(line, reference, xs) for line in chart.lines if len(line.x)]
     rows = list(map(human_label, chart.rows))
-    return _given(vars(chart) | {"is_flat": chart.is_flat, "rows": rows, "x": list(map(_positions, xs)), "lines": lines})
+    drawn = {"is_flat": chart.is_flat, "rows": rows, "x": list(map(_positions, xs)), "lines": lines}
+    return _given(vars(chart) | drawn | {"x_name": "", "y_name": ""})
 
 
 def _given(fields: Mapping[str, Any]) -> dict[str, Any]:

@@ -80,6 +80,8 @@ def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
         y_log=True,
         ticks=[(float(dt), plain(1e3 * dt)) for dt in [*ends, *dts]],
         rounding=rounding,
+        x_name="time step [s]",
+        y_name=f"absolute value of {metric_label(metric)}",
     )
 
 

@@ -151,10 +151,12 @@ def save_charts(charts: Sequence[Chart], file: Path) -> None:
 def save_data(charts: Sequence[Chart], file: str | Path) -> None:
     """Save the data of charts as CSV, with all digits: a row for each point of each line.
 
-    The columns are the number of the chart, the labels of its axes, the label of the line, x, y, and the ends `low` and `high` of a band.
+    The columns are the number of the chart, the names of x and y with their units, the label of the line, how it is drawn (points, line or
+    band), x, y, and the ends `low` and `high` of a band.
     """
     lines = [
-        {"chart": number, "x_label": chart.x_label, "y_label": chart.y_label, "line": line.label}
+        {"chart": number, "x_label": chart.x_name or chart.x_label, "y_label": " ".join((chart.y_name or chart.y_label).split())}
+        | {"line": line.label, "drawn": "band" if line.low is not None else "points" if line.marker else "line"}
         | {"x": line.x, "y": np.nan if line.is_fill else line.y, "low": line.low, "high": line.high}
         for number, chart in enumerate(charts, 1)
         for line in chart.lines

@@ -51,6 +51,8 @@ def failure_modes(found: RobustnessStudy, axis_name: str) -> Chart:
         ticks=_ticks(axis, values),
         x_range=(axis.coordinate(min(values)), axis.coordinate(max(values))) if max(values) > min(values) else None,
         rows=[scan.engine for scan in scans],
+        x_name="-log(1 - restitution)" if axis.name == "restitution" else f"log of {axis.label}",
+        y_name="number of the engine",
     )
 
 

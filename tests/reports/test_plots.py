@@ -4,6 +4,7 @@ import io
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import dropspin as ds
@@ -361,9 +362,19 @@ def test_data_of_charts_is_saved_with_all_digits(lines_of, tmp_path):
     band = plots.Line("band", np.array([0.0, 0.1]), np.zeros(2), low=np.array([-1.0, -2.0]), high=np.array([1.0, 1 / 3]), is_fill=True)
     plots.save_data([lines_of(1 / 3), plots.Chart("x", "y", [band])], tmp_path / "data.csv")
     rows = (tmp_path / "data.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[0] == "chart,x_label,y_label,line,x,y,low,high"
-    assert rows[1] == f"1,x,y,at {1 / 3},0.0,{1 / 3},,"
-    assert rows[4] == f"2,x,y,band,0.1,,-2.0,{1 / 3}"
+    assert rows[0] == "chart,x_label,y_label,line,drawn,x,y,low,high"
+    assert rows[1] == f"1,x,y,at {1 / 3},line,0.0,{1 / 3},,"
+    assert rows[4] == f"2,x,y,band,band,0.1,,-2.0,{1 / 3}"
+
+
+def test_data_of_errors_over_the_time_step_are_in_seconds_with_points_apart_from_fits(tmp_path):
+    """The ticks of the chart are in milliseconds."""
+    results = ds.run("spin-dzhanibekov", "mujoco", dt=[8e-3, 4e-3, 2e-3])
+    plots.save_data([plots.error_over_dt(results, "spin-dzhanibekov", "orientation_error")], tmp_path / "data.csv")
+    data = pd.read_csv(tmp_path / "data.csv").query("line == 'mujoco' and drawn == 'points'")
+    assert [*data["x_label"].unique(), *data["y_label"].unique()] == ["time step [s]", "absolute value of orientation error [rad]"]
+    errors = results.measurements.query("metric == 'orientation_error'")
+    np.testing.assert_array_equal(data[["x", "y"]], errors.assign(value=errors["value"].abs()).sort_values("dt")[["dt", "value"]])
 
 
 def test_ensembles_are_saved_and_drawn_in_three_panels(ensemble, tmp_path):

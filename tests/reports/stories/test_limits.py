@@ -55,6 +55,10 @@ def test_tables_of_largest_steps_and_of_sound_ranges(study):
     }
 
 
+def test_data_of_a_chart_name_the_positions_along_its_axis(study):
+    assert [plots.failure_modes(study, axis).x_name for axis in ("spin", "step")] == ["log of spin [rad/s]", "log of step [s]"]
+
+
 def test_sound_range_around_the_nominal_value():
     """Both ways from the scene's nominal value, as far as every point is sound; none if the nominal value is not."""
     found = scan("a", ["sound", "inaccurate", "sound", "sound", "sound", "clamped", "sound"])

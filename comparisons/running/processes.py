@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
-from multiprocessing import get_all_start_methods, get_context
+from multiprocessing import current_process, get_all_start_methods, get_context
 from types import TracebackType
 from typing import Self, TypeVar, TypeVarTuple
 
@@ -48,9 +48,17 @@ class EngineProcesses:
     Args:
         resources: What each may use.
         start_method: A start method of `multiprocessing`; None to fork where the system can.
+
+    Raises:
+        DropspinError: This process may not start others.
     """
 
     def __init__(self, resources: ResourceLimits, start_method: str | None = None) -> None:
+        if current_process().daemon:
+            raise DropspinError(
+                "a worker of multiprocessing.Pool may not start processes, in which engines are isolated; use "
+                "concurrent.futures.ProcessPoolExecutor."
+            )
         # A forked process has the engine already, even one that cannot be pickled, and does not run the user's script again.
         self._start_method = start_method or ("fork" if "fork" in get_all_start_methods() else "spawn")
         self._resources = resources

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from dropspin.comparisons.judging.verdicts import FAILURES, VERDICTS
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.conclusion import WITHIN
@@ -168,10 +168,11 @@ def shown_scenes(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str
 def step_times(results: Results) -> dict[str, float]:
     """The time per step [s], by engine: the geometric mean over the scenes and time steps in which all engines were timed.
 
-    Ratios of these times are therefore the geometric means of the ratios. NaN for an engine that was not timed, and for all if there are no
-    scenes and time steps in which all engines were timed.
+    Ratios of these times are therefore the geometric means of the ratios. NaN for an engine that was not timed or broke down in every
+    scene, and for all if there are no scenes and time steps in which all others were timed and did not break down.
     """
-    timed = results.table[results.table["time_per_step"] > 0.0].drop_duplicates(["scene", "engine", "dt"])
+    table = results.table[~results.table["verdict"].isin(BREAKDOWNS)]
+    timed = table[table["time_per_step"] > 0.0].drop_duplicates(["scene", "engine", "dt"])
     times = timed.pivot(index=["scene", "dt"], columns="engine", values="time_per_step")
     means = np.exp(np.log(times.dropna()).mean())
     return {engine: float(means.get(engine, math.nan)) for engine in results.engines}

@@ -9,6 +9,7 @@ import textwrap
 import threading
 import time
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import current_process
 from pathlib import Path
 from unittest import mock
 
@@ -90,6 +91,13 @@ def test_system_that_starts_no_process_is_not_blamed_on_the_output_folder(where,
     assert done.returncode == 2
     assert done.stderr.splitlines()[-1].startswith(f"dropspin: the system cannot start a process for wang: {os.strerror(code)}; shared ")
     assert not list(tmp_path.iterdir())
+
+
+def test_worker_that_may_start_no_process_is_named(monkeypatch):
+    """As one of a pool of multiprocessing."""
+    monkeypatch.setattr(current_process(), "_config", {"daemon": True})
+    with pytest.raises(ds.DropspinError, match=r"use concurrent\.futures\.ProcessPoolExecutor"):
+        ds.run([BALL], "wang", [4e-3])
 
 
 def _work_for_two_seconds(entry):

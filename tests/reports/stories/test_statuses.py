@@ -12,7 +12,7 @@ from dropspin.comparisons.judging.verdicts import OUTCOMES, VERDICTS
 from dropspin.comparisons.results.results import MODEL_ERROR, UNDECIDED, Status
 from dropspin.reports.junit import junit_xml
 from dropspin.reports.plots.colours import human_label
-from dropspin.reports.stories.matrix import MEANINGS, explanations, leading_errors, shown_scenes
+from dropspin.reports.stories.matrix import MEANINGS, explanations, leading_errors, shown_scenes, step_times
 from dropspin.reports.stories.run import overview
 
 
@@ -167,3 +167,10 @@ def test_known_faults_are_counted_apart_and_in_the_headline(core, summary):
     assert faults > 0
     assert f"known fault in {faults}" in sentence
     assert junit_xml(core).decode().count("known fault: ") == len(judged)
+
+
+def test_an_engine_that_breaks_down_everywhere_has_no_time_per_step():
+    """It takes none of the others' time either."""
+    times = step_times(ds.run("spin-principal", [made.engine_with("lost", made.nan_after_half_a_second), "wang"], dt=4e-3))
+    assert np.isnan(times["lost"])
+    assert times["wang"] > 0.0

@@ -133,7 +133,8 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     if budget.dts and metric.name not in JUMPING:
         used = np.isin(dts, budget.dts)
         logs = np.log(dts[used]) - np.mean(np.log(dts[used]))
-        shares = np.array([point.tolerance for point in series])[used] / np.abs(errors[used])
+        fitted = errors if length.cause == "discretisation" else errors - length.asymptotic_error
+        shares = np.array([point.tolerance for point in series])[used] / np.abs(fitted[used])
         order_tolerance = float(np.sum(np.abs(logs) * shares) / np.sum(logs**2))
     deciding = budget if vector is None or budget.cause != "discretisation" else vector
     is_open = deciding.cause == "unresolved" and has_value and float(np.nanmax(np.abs(errors))) > floor

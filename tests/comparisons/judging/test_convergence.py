@@ -1,6 +1,7 @@
 """Causes, orders and asymptotic errors of engines whose faults are known."""
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -217,6 +218,21 @@ def test_claim_of_exactness_fails_where_an_error_has_no_order():
     order = judge_order(claim, metric, convergence(ds.load("spin-principal"), claim, metric, series))
     assert order.verdict == "failed"
     assert math.isnan(order.tolerance)
+
+
+def test_tolerance_of_an_order_about_a_model_error():
+    """The largest change of the slope of the errors minus the asymptotic error, of which one error passes 0."""
+    steps, errors, change = [16e-3, 8e-3, 4e-3, 2e-3, 1e-3], np.array([0.03, 0.01, 0.0, -0.005, -0.0075]), 1e-6
+    series = [SeriesPoint(dt, 100, average([[value]]), None, change) for dt, value in zip(steps, errors, strict=True)]
+    found = convergence(ds.load("spin-principal"), Claim("made", None, np.float64), ds.METRICS["energy_error"], series)
+    assert (found.budget.cause, found.budget.dts) == ("model", tuple(steps[-3:]))
+
+    def slope(signs):
+        rest = errors[-3:] - found.budget.asymptotic_error + change * np.array(signs)
+        return np.polyfit(np.log(steps[-3:]), np.log(rest), 1)[0]
+
+    largest = max(abs(slope(signs) - slope([0.0])) for signs in product((-1, 1), repeat=3))
+    assert found.order_tolerance == pytest.approx(largest, rel=1e-3)
 
 
 def test_exact_engine_has_rounding_errors_only():

@@ -162,6 +162,10 @@ def test_a_time_step_may_be_a_number_of_numpy(dt):
             lambda: ds.run("drop-ball", made.engine_with("a b", None)),
             "engine: Distorted.name is 'a b'; give it a name for results, of letters",
         ),
+        (
+            lambda: ds.run("drop-ball", made.engine_with("wang", None)),
+            "engine: Distorted.name is 'wang', which is a built-in engine; results need",
+        ),
         (lambda: ds.run("drop-ball", "mujocco"), "engine 'mujocco' is unknown. Did you mean 'mujoco'?"),
         (lambda: ds.run("drop-ball", "mujoco", dt="fast"), "dt: got 'fast' (str); give a number of seconds, or a list of these."),
         (lambda: ds.run("drop-ball", "mujoco", dt=["fast"]), "dt: got 'fast' (str); a time step is a number of seconds."),

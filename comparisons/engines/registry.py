@@ -192,23 +192,19 @@ def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
         raise UnknownName(f"{module_name}'s engine", attribute, known) from None
     if not _is_engine(adapter):
         raise DropspinError(f"engine {name!r}: {attribute} is not an engine; an engine is a class that inherits from dropspin.Engine.")
-    given = verified_name(adapter, f"engine {name!r}: {attribute}")
-    if given in BUILT_IN or given in EARLIER_NAMES:
-        raise DropspinError(f"engine {name!r}: {attribute}.name is {given!r}, which is a built-in engine; results need another name.")
+    verify_name(adapter, f"engine {name!r}: {attribute}")
     return adapter
 
 
-def verified_name(adapter: type[Engine], where: str) -> str:
-    """The name of a class of engines for results.
-
-    Raises:
-        DropspinError: It has none that can stand in a label and in the name of a test.
-    """
+def verify_name(adapter: type[Engine], where: str) -> None:
+    """Raise `DropspinError` if results cannot have the name of a class of engines, or if it is that of another, built-in engine."""
     given = getattr(adapter, "name", "")
     if not isinstance(given, str) or not re.fullmatch(r"[A-Za-z][\w-]*", given, re.ASCII):
         why = "give it a name for results, of letters, digits, - and _, such as 'my-engine'"
         raise DropspinError(f"{where}.name is {shown(given)}; {why}.")
-    return given
+    home = BUILT_IN.get(given, _Home(adapter.__module__, adapter.__name__))
+    if given in EARLIER_NAMES or (adapter.__module__, adapter.__name__) != home[:2]:
+        raise DropspinError(f"{where}.name is {given!r}, which is a built-in engine; results need another name.")
 
 
 def _is_engine(found: object) -> bool:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissing
 from dropspin.comparisons.engines.registry import engine as engine_named
-from dropspin.comparisons.engines.registry import is_foreign, parsed, verified_name
+from dropspin.comparisons.engines.registry import is_foreign, parsed, verify_name
 from dropspin.comparisons.engines.stand_in import Traits, stand_in, traits
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.inputs import EngineEntry, described_value, several
@@ -25,7 +25,7 @@ def engine_entry(engine: Engine | str, resources: ResourceLimits = ONE_MINUTE) -
         DropspinError: There is no engine of that name, or it is neither an engine nor a name.
     """
     if isinstance(engine, Engine):
-        verified_name(type(engine), f"engine: {type(engine).__qualname__}")
+        verify_name(type(engine), f"engine: {type(engine).__qualname__}")
         return EngineEntry(engine.label, engine)
     if not isinstance(engine, str):
         raise DropspinError(f"engine: got {described_value(engine)}; give a name such as 'mujoco', or an Engine.")

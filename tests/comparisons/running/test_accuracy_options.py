@@ -97,6 +97,8 @@ def test_substeps_conform_with_the_lag_of_a_substep():
 @pytest.mark.parametrize("lag", [True, "half", math.nan, 1.0])
 def test_lag_that_is_no_time_of_at_most_a_step_is_refused(lag):
     class Wrong(Wang):
+        name = "wrong"
+
         def prepare(self, scene, dt):
             simulation = super().prepare(scene, dt)
             simulation.velocity_lag = lag

@@ -42,6 +42,8 @@ WRONG = 0.01
 """The error of a motion, in rad or relative to the distance that it covers, up to which it is not wrong, also if it does not fall."""
 ROWS_OF_MOTION = 65
 SMALL, PATIENCE, PATIENCE_WHILE_LARGE = 1e-6, 2, 6
+LARGE_ANGLE = 0.5
+"""An angle [rad] above which an error may stay at any number of time steps and still fall at smaller ones: it is at most π."""
 
 
 Ending = Literal["budget", "longest_run", "error_stopped_falling", "failed", "not_run"]
@@ -122,7 +124,7 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
         tried.append((interval / division, run[0]))
         spent += run[1]
         undefined = run[2] or undefined
-        if stalled := _stalled([errors[0] for _, errors in tried if np.isfinite(errors[0])]):
+        if stalled := _stalled([errors[0] for _, errors in tried if np.isfinite(errors[0])], METRICS[metrics[0]].unit):
             ended, reason = "error_stopped_falling", f"at the last {stalled} time steps the error fell by less than a fifth each"
             break
         if spent >= budget:
@@ -133,8 +135,10 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
     return Ladder(entry.label, steps, ended, reason, left_out, verdict, undefined)
 
 
-def _stalled(errors: Sequence[float]) -> int:
-    """The number of last time steps over which the errors have stopped falling; 0 if they still fall, or if there are too few."""
+def _stalled(errors: Sequence[float], unit: str) -> int:
+    """The number of last time steps over which the errors have stopped falling; 0 if they still fall or may fall, or are too few."""
+    if unit == "rad" and errors and errors[-1] > LARGE_ANGLE:
+        return 0
     patience = PATIENCE if errors and errors[-1] < SMALL else PATIENCE_WHILE_LARGE
     stays = len(errors) > FEWEST_POINTS and all(later >= NO_BETTER * earlier for earlier, later in pairwise(errors[-patience - 1 :]))
     return patience if stays else 0

@@ -48,8 +48,8 @@ def tradeoff_command(scenes: tuple[str, ...], within: tuple[float, ...], output:
 
     The default is the scene spin-asymmetric, with engines and methods that give different results for it.
 
-    Exit code: 0 whatever is measured, also if an engine diverges at some time steps, 2 bad input, 3 an engine crashed or exceeded a
-    limit, its batches broke down, or one that was named is missing.
+    Exit code: 0 whatever is measured, also if an engine diverges at some time steps, 2 bad input, or no engine can be
+    compared, 3 an engine crashed or exceeded a limit, its batches broke down, or one that was named is missing.
     """
     from dropspin.comparisons.engines.base import EngineBroken
     from dropspin.comparisons.tradeoff.study import NotCompared, tradeoff

@@ -18,6 +18,8 @@ WITHIN = 0.01
 """The share of its scale that an error may have, unless another one is asked for."""
 QUESTIONS = ("orientation_error", "bounce_height_error", "energy_error", "angular_momentum_error", "position_error")
 """The metrics that a conclusion may be about, those that are named first where there are many."""
+REMAINING = ("model", "setting")
+"""The causes of an error that does not vanish as dt → 0."""
 ENOUGH = 3
 """Scenes that must test a question before an engine is recommended for it."""
 
@@ -33,14 +35,15 @@ class Answer:
         engine: The engine's label.
         scenes: The number of scenes that test the metric.
         within: The scenes in which the error is within the tolerance, at `dt` and at each smaller time step that was tried.
-        beyond: The scenes in which it is not at the finest time step, or in which the engine broke down there.
+        beyond: The scenes in which it is not at the finest time step, or will not be as dt → 0, or in which the engine broke down there.
         undecided: The scenes in which the error at the finest time step is as near to the tolerance as its own uncertainty.
         dt: The largest time step [s] at which it is within the tolerance in each scene of `within`; NaN if there is no such scene.
         steps: The time steps [s] that were tried in each scene of `within`, smallest first.
         condition: What at least two scenes of `beyond`, and none of the others, have: of `CONDITIONS` the one that most have; or empty.
         named: The scenes of `beyond` that do not have it.
         declined: The number of scenes that the engine or its adapter declines.
-        largest: The largest error of `beyond` at the finest time step, relative to its scale; NaN without one, or after a breakdown.
+        largest: The largest error of `beyond` at the finest time step, or as dt → 0, relative to its scale; NaN without one, or after a
+            breakdown.
         worst: The scene with this error; or empty.
         cost: Median of the computing time per simulated second, at `dt`; NaN if it was not measured.
     """
@@ -101,6 +104,9 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     is_lost = pd.MultiIndex.from_frame(errors[pair]).isin(pd.MultiIndex.from_frame(lost[pair])) & (errors["metric"] != "position_error")
     states = np.where(is_lost & (states == "within"), "undecided", states)
     found = errors.assign(size=sizes, state=states, cost=errors["time_per_step"] / errors["dt"])
+    remains = table[(table["kind"] == "asymptotic_error") & table["cause"].isin(REMAINING) & ~table["scene"].isin(results.recorded)]
+    least = remains.assign(value=remains[["lower", "upper"]].abs().min(axis=1))
+    remains = remains.assign(size=relative_sizes(remains, results.scenes))[np.array(relative_sizes(least, results.scenes)) > within]
     keys = ["engine", "scene", "dt"]
     steps = tried[keys].assign(default=np.where(is_broken[tried.index], "beyond", "undecided")).drop_duplicates(keys)
     declined = table[table["verdict"] == "declined"].drop_duplicates(["engine", "scene"])
@@ -116,13 +122,21 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
             series = tested[tested["engine"] == engine]
             if len(series):
                 absent = declined[(declined["engine"] == engine) & declined["scene"].isin(scenes)]
-                answers.append(_answer(metric, engine, len(scenes), len(absent), series, results.scenes))
+                limits = remains[(remains["engine"] == engine) & (remains["metric"] == metric)].set_index("scene")["size"]
+                answers.append(_answer(metric, engine, len(scenes), len(absent), series, limits, results.scenes))
     return answers
 
 
-def _answer(metric: str, engine: str, scenes: int, declined: int, series: pd.DataFrame, models: Mapping[str, Scenario]) -> Answer:
-    """The answer from an engine's rows of scene, time step, state, relative size of the error, and computing time per simulated second."""
-    finest = series.loc[series.groupby("scene", sort=False)["dt"].idxmin()]
+def _answer(
+    metric: str, engine: str, scenes: int, declined: int, series: pd.DataFrame, limits: "pd.Series[float]", models: Mapping[str, Scenario]
+) -> Answer:
+    """The answer from an engine's rows of scene, time step, state, relative size of the error, and computing time per simulated second.
+
+    `limits` has the relative size of the asymptotic error by scene, where it is beyond the tolerance.
+    """
+    finest = series.loc[series.groupby("scene", sort=False)["dt"].idxmin()].set_index("scene", drop=False)
+    grows = finest.index[(finest["state"] == "within") & finest["scene"].isin(limits.index)]
+    finest.loc[grows, "state"], finest.loc[grows, "size"] = "beyond", limits[grows]
     of = {state: tuple(finest.loc[finest["state"] == state, "scene"]) for state in ("within", "beyond", "undecided")}
     kept = series[series["scene"].isin(of["within"])]
     counts = kept.groupby("dt")["scene"].nunique()
@@ -134,7 +148,7 @@ def _answer(metric: str, engine: str, scenes: int, declined: int, series: pd.Dat
     condition = max(having, key=lambda name: len(having[name]), default="") if others else ""
     covered = having[condition] if condition and len(having[condition]) > 1 else set()
     dt = max(held, default=math.nan)
-    sizes = finest[finest["state"] == "beyond"].set_index("scene")["size"]
+    sizes = finest.loc[finest["state"] == "beyond", "size"]
     largest = float(sizes.max(skipna=False))
     return Answer(
         metric=metric,

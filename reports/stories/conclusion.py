@@ -122,8 +122,6 @@ def _steps(answer: Answer) -> str:
     """The time steps at which an engine is within the tolerance."""
     if math.isnan(answer.dt):
         return "at the finest step of each scene"
-    if len(answer.steps) > 1 and answer.dt == answer.steps[-1]:
-        return "at any step tried"
     return f"at {in_ms(answer.dt)}{' or less' if answer.dt > answer.steps[0] else ''}"
 
 

@@ -104,7 +104,7 @@ def named(text, scenes):
     return set(re.split(", | and ", text)) == set(scenes) if len(scenes) <= 3 else text == f"{len(scenes)} scenes"
 
 
-STEP = r"at (?:(?P<any>any step tried)|(?P<dt>\S+) ms(?P<less> or less)?|the finest step of each scene)"
+STEP = r"at (?:(?P<dt>\S+) ms(?P<less> or less)?|the finest step of each scene)"
 SIZE = r"(?:up to )?\S+ (?:%|rad)(?: in [a-z-]+)?"
 SAID = re.compile(rf"(?P<no>not |undecided for )?(?P<engines>.+?)(?: {STEP}| \((?P<size>{SIZE})\))?(?: in (?P<scenes>.+))?")
 USED = re.compile(
@@ -144,11 +144,10 @@ def verify_use(run, metric, engine, clause):
     assert len(kinds["within"]) > len(kinds["beyond"] | kinds["undecided"])
     common = sorted(set.intersection(*(set(of[scene]) for scene in kinds["within"])))  # no step is named that was not tried
     held = [all(one == "within" for scene in kinds["within"] for at, one in of[scene].items() if at <= step) for step in common]
-    dt = common[-1] if said["any"] else 1e-3 * float(said["dt"])
+    dt = 1e-3 * float(said["dt"])
     assert dt in STEPS
     assert dt == max(step for step, has_held in zip(common, held, strict=True) if has_held)
-    assert bool(said["less"]) == (not said["any"] and dt > common[0])
-    assert said["any"] or len(common) == 1 or dt < common[-1]
+    assert bool(said["less"]) == (dt > common[0])
     covered = {scene for scene in tested if said["condition"] and CONDITIONS[said["condition"]](SCENES[scene])} & set(finest)
     assert covered <= kinds["beyond"]
     assert len(covered) == int(said["covered"] or 0)
@@ -187,8 +186,8 @@ def verify_statement(run, metric, sentence):
                 expected = {"not ": "beyond", "undecided for ": "undecided", None: "within"}[parts["no"]]
                 assert found[min(found)] == expected
                 said.add((engine, scene))
-                if parts["dt"] or parts["any"]:
-                    dt = 1e-3 * float(parts["dt"]) if parts["dt"] else max(found)
+                if parts["dt"]:
+                    dt = 1e-3 * float(parts["dt"])
                     assert dt in found
                     assert all(one == "within" for step, one in found.items() if step <= dt)
     assert said == {(engine, scene) for engine in run.engines for scene in tested if states(run, metric, engine, scene)}
@@ -228,7 +227,7 @@ def test_scenes_in_which_the_only_engine_broke_down_are_exceptions():
             exact = {"kind": "truth", "metric": "energy_error", "unit": "1", "value": 0.0, "tolerance": 0.0, "verdict": "measured"}
             rows.append(Measurement(**case, verdict="diverged") if scene == "drop-ball" else Measurement(**case, **exact))
     run = Results(as_table(rows), SCENES, ("a",), {}, provenance={"asked": {"within": 0.01}})
-    assert any(str(sentence) == "For energy within 1 % use a at any step tried, except in drop-ball." for sentence in conclusion(run))
+    assert any(str(sentence) == "For energy within 1 % use a at 4 ms or less, except in drop-ball." for sentence in conclusion(run))
 
 
 @pytest.mark.parametrize(("limit", "cause", "is_recommended"), [(0.02, "model", False), (0.02, "unresolved", True), (0.005, "model", True)])
@@ -242,7 +241,7 @@ def test_an_error_that_grows_beyond_the_tolerance_at_smaller_steps_is_not_recomm
         rows.append(Measurement(**case, kind="asymptotic_error", value=limit, cause=cause, verdict="failed", **ends))
     run = Results(as_table(rows), SCENES, ("a",), {}, provenance={"asked": {"within": 0.01}})
     none = "no engine is recommended: a (within 1 % in 0 of 3 scenes, up to 2.0 % in drop-ball)."
-    assert str(conclusion(run)[0]) == f"For energy within 1 % {'use a at any step tried.' if is_recommended else none}"
+    assert str(conclusion(run)[0]) == f"For energy within 1 % {'use a at 4 ms or less.' if is_recommended else none}"
 
 
 def verify_counts(run, metric, clauses):

@@ -41,6 +41,8 @@ CHECKS: dict[str, Callable[[Engine], str]] = {
 
 SUSPECT = ("failed", "crashed")
 """Outcomes that state left by other checks may cause."""
+MOST_TIMED_OUT = 2
+"""Checks that may use up their time before the others are not run: an engine that waits forever would use up that of all of them."""
 BETWEEN_PROCESSES = 1e-6
 """Relative difference that rounding may cause between two processes."""
 AFTER_SIMILAR = "a scene has another motion after one that differs from it in one quantity than alone: a simulation leaves state behind"
@@ -64,7 +66,8 @@ def conform(
         on_result: Called with the outcome of each check as soon as it is known.
 
     Returns:
-        The outcome of each check, in order. If the engine crashes or hangs, only the current check fails.
+        The outcome of each check, in order. If the engine crashes or hangs, only the current check fails; after two checks that use up
+        their time, the others of all checks are not run.
 
     Raises:
         UnknownName: There is no such check.
@@ -75,7 +78,11 @@ def conform(
     entry, results = present_entry(engine), list[CheckResult]()
     with tempfile.TemporaryDirectory() as folder, EngineProcesses(resources) as processes:
         for check in checks or CHECKS:
-            result = _result(processes, entry, check, folder)
+            late = [result.check for result in results if result.outcome == "timed_out"][:MOST_TIMED_OUT]
+            if len(late) == MOST_TIMED_OUT and not checks:
+                result = CheckResult(check, "timed_out", f"not run, because {' and '.join(late)} used up their time; run it with --check")
+            else:
+                result = _result(processes, entry, check, folder)
             if result.outcome in SUSPECT and results:
                 result = _alone(processes, entry, check, folder, result)
             if check == "repeats" and result.outcome == "passed" and (why := _changed_by_similar(processes, entry)):

@@ -4,9 +4,11 @@ import os
 
 import numpy as np
 import pytest
+from support import breaking
 from support import engines as made
 
-from dropspin.comparisons.conformance.checks import AFTER_OTHERS, AFTER_SIMILAR, ANOTHER_PROCESS, conform
+from dropspin.comparisons.conformance.checks import AFTER_OTHERS, AFTER_SIMILAR, ANOTHER_PROCESS, CHECKS, conform
+from dropspin.comparisons.running.process_limits import ResourceLimits
 
 pytestmark = pytest.mark.usefixtures("engine_processes")
 
@@ -69,3 +71,23 @@ def test_engine_that_ends_its_process_in_a_later_check_costs_this_check_alone():
 
     found = {one.check: one.outcome for one in conform(Exiting(), ["coasting", "dull ball", "turning"])}
     assert found == {"coasting": "passed", "dull ball": "crashed", "turning": "passed"}
+
+
+def test_an_engine_that_waits_for_ever_is_waited_for_twice():
+    """A check that is named is run all the same."""
+
+    class Waiting(made.Exact):
+        name = "waiting"
+
+        def prepare(self, scene, dt):
+            breaking.sleep()
+
+    limits = ResourceLimits(processor_time=0.05)
+    found = conform(Waiting(), resources=limits)
+    late = [result for result in found if result.outcome == "timed_out"]
+    assert [result.check for result in found] == list(CHECKS)
+    assert [result.message.startswith("not done after ") for result in late] == [True, True] + [False] * (len(late) - 2)
+    why = f"not run, because {late[0].check} and {late[1].check} used up their time; run it with --check"
+    assert {result.message for result in late[2:]} == {why}
+    [named] = conform(Waiting(), ["repeats"], resources=limits)
+    assert named.message.startswith("not done after ")

@@ -54,7 +54,7 @@ REMAINDER, ALONE = 0.05, 0.01
 as large as its other first-order part, or as the term of first order beside the second; and without any other part.
 """
 LONGEST_PERIOD = 64
-"""Largest common multiple of the steps, in finest ones, for which each remainder has a form of its own; else they count as independent."""
+"""Largest common multiple of the steps, in common divisors, for which each remainder has its own form; else they count as independent."""
 UNIFORM = 1.0 / math.sqrt(12.0)
 """Standard deviation of a number that is uniform between 0 and 1."""
 DISCREPANCIES = {0.001: 0.7, 0.2: 0.3}
@@ -225,19 +225,19 @@ def _series(steps: Array, order: float, one_start: bool) -> Iterator[tuple[Array
 def remainders(steps: Array) -> Iterator[tuple[Array, float]]:
     """Terms of the remainder of a time divided by each step, which is uniform between 0 and 1, and their probability.
 
-    If each step is a multiple of the finest, the time is i + x finest steps. All remainders of i, up to the least common multiple of the
-    steps, are equally probable; x is uniform between 0 and 1 and the same at all steps, a constant error. Otherwise the remainders count as
-    independent.
+    If the steps have a common divisor u, the time is (i + x) u. All remainders of i, up to the least common multiple of the steps, are
+    equally probable; x is uniform between 0 and 1 and the same at all steps. Otherwise the remainders count as independent.
     """
-    finest = float(np.min(steps))
-    multiples = np.round(steps / finest).astype(int)
-    period = int(np.lcm.reduce(multiples))
-    if not np.allclose(steps / finest, multiples, rtol=1e-9, atol=0.0) or period > LONGEST_PERIOD:
-        yield np.vstack([np.full(len(steps), 0.5), np.eye(len(steps)) * UNIFORM]), 1.0
-        return
-    whole, counts = np.unique(np.arange(period)[:, None] % multiples, axis=0, return_counts=True)
-    for each, count in zip(whole, counts, strict=True):
-        yield np.array([each + 0.5, np.full(len(steps), UNIFORM)]) / multiples, float(count) / period
+    ratios = steps / np.min(steps)
+    for divisor in range(1, LONGEST_PERIOD + 1):  # the finest step divided by u
+        multiples = np.round(divisor * ratios).astype(int)
+        period = math.lcm(*map(int, multiples))
+        if period <= LONGEST_PERIOD and np.allclose(divisor * ratios, multiples, rtol=1e-9, atol=0.0):
+            whole, counts = np.unique(np.arange(period)[:, None] % multiples, axis=0, return_counts=True)
+            for each, count in zip(whole, counts, strict=True):
+                yield np.array([each + 0.5, np.full(len(steps), UNIFORM)]) / multiples, float(count) / period
+            return
+    yield np.vstack([np.full(len(steps), 0.5), np.eye(len(steps)) * UNIFORM]), 1.0
 
 
 def _fit(forms: _Forms, e: Array, noise: Array) -> _Fit:

@@ -19,6 +19,7 @@ STEPS: dict[str, Array] = {
     "6, ratio 1.5": 1.5 ** -np.arange(6.0),
     "7, ratio 1.5": 1.5 ** -np.arange(7.0),
     "7, most of them close": np.array([4.0, 2.0, 1.2, 1.15, 1.1, 1.05, 1.0]) / 4.0,
+    "5 with a common divisor": np.array([20.0, 10.0, 5.0, 4.0, 2.0]) / 20.0,
     "5, no multiples": np.array([1.0, 0.53, 0.29, 0.137, 0.0613]),
 }
 """Time steps relative to the coarsest, by how many they are; halved ones have no further name."""
@@ -171,5 +172,5 @@ def steps_of(name: str) -> tuple[str, ...]:
     if "close" in name:
         return (*(each for each in CLOSE if each != "5, no multiples"), "6", "7")
     if "remainder" in name:
-        return "3", "5", "5, no multiples"
+        return "3", "5", "5 with a common divisor", "5, no multiples"
     return "3", "5"

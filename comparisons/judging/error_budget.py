@@ -3,16 +3,16 @@
 An error that vanishes as dt → 0 is a discretisation error; one that does not is a model error. The asymptotic error has a 95 %
 interval; docs/coverage.md counts how often the interval contains the true value. A cause is stated if its opposite is improbable:
 
-    model            it is improbable that the asymptotic error is 0 or has the other sign
+    model            it is improbable that the asymptotic error is 0 or has the other sign, and the interval excludes 0
     discretisation   it is improbable that the asymptotic error is larger than allowed, likely that it is at most half of that, and very
                      improbable that it is larger than half of the error at the coarsest of the three finest time steps. The allowed size
                      is the error at the finest time step, or 1/64 of that at the coarsest, but more than the noise
     rounding         no error is larger than rounding
     unresolved       all other cases: the time steps do not determine the cause
 
-The interval excludes 0 if the cause is `model`, and contains 0 otherwise. It is computed as if the asymptotic error were not 0. That of a
-discretisation error with a sign ends at the allowed error, or at half of it if the probability of more is below 1 %. That an error vanishes
-is said only if its interval ends before half of the error at the finest time step.
+The interval contains 0 if the cause is not `model`. It is computed as if the asymptotic error were not 0. That of a discretisation error
+with a sign ends at the allowed error, or at half of it if the probability of more is below 1 %. That an error vanishes is said only if its
+interval ends before half of the error at the finest time step.
 """
 
 from __future__ import annotations  # help() then shows ArrayLike, not all that it stands for
@@ -225,7 +225,8 @@ def _attributed(
     median, lower, upper = posterior.interval(judged_together)
     if not posterior.has_sign:  # one part that is smaller than another does not show
         upper = max(upper, finest)
-    if max(above, below) > 1.0 - MODEL_RISK / judged_together:
+    excludes_zero = floor > 0.0 or lower > 0.0 or upper < 0.0  # the interval of a model error begins beyond the floor
+    if excludes_zero and max(above, below) > 1.0 - MODEL_RISK / judged_together:
         lower, upper = (lower, min(upper, -floor)) if posterior.has_sign and below > above else (max(lower, floor), upper)
         return "model", (median, lower, upper)
     lower, upper = min(lower, 0.0), max(upper, 0.0)

@@ -282,3 +282,12 @@ def test_student_t_is_the_integral_of_its_density(freedom, x):
     n = mpmath.mpf(freedom)
     density = lambda t: (1 + t * t / n) ** (-(n + 1) / 2) / (mpmath.sqrt(n) * mpmath.beta(mpmath.mpf("0.5"), n / 2))  # noqa: E731
     assert student_t(freedom, np.array([x]))[0] == pytest.approx(float(mpmath.quad(density, [-mpmath.inf, 0, x])), abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("h", "errors", "signed"), [(H, [0.56945899, 0.54291971, 0.55775587], False), (FIVE[1:], (FIVE[1:] / FIVE[1]) ** -0.2441339, True)]
+)
+def test_model_error_has_an_interval_that_excludes_zero(h, errors, signed):
+    """Where 0 is less probable than 3 %, but within the interval, the cause is not decided."""
+    found = error_budget(h, errors, signed=signed)
+    assert (found.cause, found.lower <= 0.0 <= found.upper) == ("unresolved", True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import KnownLimitation
-from dropspin.comparisons.judging.error_budget import ErrorBudget, error_budget, is_sufficient, vector_budget
+from dropspin.comparisons.judging.error_budget import ErrorBudget, error_budget, is_sufficient, vector_budget, widened
 from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY, Cause
 from dropspin.comparisons.measuring.comparison import Unresolved
 from dropspin.comparisons.measuring.metric import Average, Metric
@@ -125,10 +125,10 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
         noise = STANDARD_DEVIATIONS * np.maximum(resolutions, chance)
         return error_budget(dts, errors, claim.order, noise, rounded, signed=metric.signed, negligible=floor), errors
 
-    length, errors = _worst(series, judged, floor)
+    (length, errors), at = _worst(series, judged, floor), int(np.argmin(dts))
     has_value = not math.isnan(length.asymptotic_error)
     vector = _budget_of_components(scene, claim, metric, series, np.isfinite(errors), rounded) if has_value else None
-    budget = length if vector is None else _corrected(length, vector, finest=abs(float(errors[np.argmin(dts)])))
+    budget = length if vector is None else _corrected(length, vector, abs(float(errors[at])), max(floor, float(rounded[at])))
     order_tolerance = math.nan
     if budget.dts and metric.name not in JUMPING:
         used = np.isin(dts, budget.dts)
@@ -138,8 +138,8 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
         order_tolerance = float(np.sum(np.abs(logs) * shares) / np.sum(logs**2))
     deciding = budget if vector is None or budget.cause != "discretisation" else vector
     is_open = deciding.cause == "unresolved" and has_value and float(np.nanmax(np.abs(errors))) > floor
-    finest = _finest(series)
-    return Convergence(budget, finest.dt, order_tolerance, is_open, remark, finest.average.value if is_sufficient(list(dts)) else math.nan)
+    finest_error = series[at].average.value if is_sufficient(list(dts)) else math.nan
+    return Convergence(budget, series[at].dt, order_tolerance, is_open, remark, finest_error)
 
 
 def beside_recording(result: Convergence, uncertainty: float) -> Convergence:
@@ -188,8 +188,8 @@ def is_refuted(found: Convergence, finer: Convergence) -> bool:
     return finer.budget.cause not in ("model", "unresolved") or (finer.budget.cause == "unresolved" and is_nearer)
 
 
-def _corrected(length: ErrorBudget, vector: ErrorBudget, finest: float) -> ErrorBudget:
-    """The error budget of a length, corrected by that of its components; `finest` is the error at the finest time step."""
+def _corrected(length: ErrorBudget, vector: ErrorBudget, finest: float, floor: float) -> ErrorBudget:
+    """The budget of a length, corrected by that of its components, from the error at the finest time step and a negligible one."""
     if vector.cause == "model" and length.cause in ("discretisation", "unresolved"):
         # The length is largest at another time than that of the components, so it may be larger than they are.
         return replace(vector, upper=max(length.upper, vector.upper), reason=f"{vector.reason}, in a component")
@@ -198,7 +198,7 @@ def _corrected(length: ErrorBudget, vector: ErrorBudget, finest: float) -> Error
         reason = "the length seems to grow at finer time steps, but no component grows"
         return ErrorBudget("unresolved", reason, length.asymptotic_error, 0.0, max(length.upper, vector.upper))
     # The length is at least that of the components at their time.
-    return length if length.cause == "model" else replace(length, upper=max(length.upper, vector.upper))
+    return length if length.cause == "model" or vector.upper <= length.upper else widened(length, vector.upper, finest, floor)
 
 
 def _worst(series: Sequence[SeriesPoint], judged: Callable[[Part], Judged], floor: float) -> Judged:

@@ -178,8 +178,32 @@ def error_budget(
         return ErrorBudget(cause, EARLY if is_early else SLOW if is_slow else _why_unresolved(e, noise, floor), *in_units)
     has_order = not math.isnan(order)
     orders = (min(posterior.order_lower, order), max(posterior.order_upper, order)) if has_order else (math.nan, math.nan)
-    power = f" as dt^{order:.2f} ({orders[0]:.2f} to {orders[1]:.2f})" if is_determined(*orders) else ""
-    return ErrorBudget(cause, _trend(cause, e, limit, power, negligible, unit), *in_units, order, *orders, fitted)
+    found = ErrorBudget(cause, "approaches a value other than 0", *in_units, order, *orders, fitted)
+    if cause == "model":
+        return replace(found, reason=found.reason + _power(found))
+    return widened(found, found.upper, unit * abs(float(e[-1])), unit * negligible)
+
+
+def widened(budget: ErrorBudget, upper: float, finest: float, negligible: float) -> ErrorBudget:
+    """An error budget without a model error whose interval extends at least to `upper`; the reason says so.
+
+    Args:
+        budget: The error budget.
+        upper: The upper end that the interval reaches at least.
+        finest: The size of the error at the finest time step.
+        negligible: An asymptotic error up to this size is negligible.
+    """
+    wider = replace(budget, upper=max(budget.upper, upper))
+    if budget.cause != "discretisation":
+        return wider
+    reach, power = max(-wider.lower, wider.upper), _power(budget)
+    if reach < 0.5 * finest:
+        reason = f"vanishes{power or ' as dt → 0'}"
+    elif reach <= negligible:
+        reason = f"at most {reach:.2g} remains as dt → 0, which is negligible"
+    else:
+        reason = f"falls{power or ' with dt'}; up to {reach:.2g} may remain as dt → 0"
+    return replace(wider, reason=reason)
 
 
 def vector_budget(
@@ -240,16 +264,9 @@ def _attributed(
     return "discretisation", (min(max(median, -reach), reach), max(lower, -reach), min(upper, reach))
 
 
-def _trend(cause: Cause, e: Array, limit: Sequence[float], power: str, floor: float, unit: float) -> str:
-    """How an error with a known cause depends on the time step; the errors and their limit are in multiples of the unit."""
-    if cause == "model":
-        return f"approaches a value other than 0{power}"
-    reach = max(-limit[1], limit[2])
-    if reach < 0.5 * abs(float(e[-1])):
-        return f"vanishes{power or ' as dt → 0'}"
-    if reach <= floor:
-        return f"at most {unit * reach:.2g} remains as dt → 0, which is negligible"
-    return f"falls{power or ' with dt'}; up to {unit * reach:.2g} may remain as dt → 0"
+def _power(budget: ErrorBudget) -> str:
+    orders = budget.order_lower, budget.order_upper
+    return f" as dt^{budget.order:.2f} ({orders[0]:.2f} to {orders[1]:.2f})" if is_determined(*orders) else ""
 
 
 def _why_insufficient(usable: Array, of: int) -> str:

@@ -77,6 +77,18 @@ def test_irregular_convergence_is_no_model_error():
     assert "no component grows" in error.reason
 
 
+def test_reason_states_the_interval_that_components_widen():
+    """A length that halves, and components that change irregularly: the interval reaches as far as theirs."""
+    scene, components = ds.load("spin-asymmetric"), [(2e-3, 1e-3, 0.0), (0.5e-3, -1e-3, 0.0), (1e-3, 0.6e-3, 0.0)]
+    series = [
+        SeriesPoint(dt, scene.steps(dt), average([2.0 * dt]), average([each]), 3e-8)
+        for dt, each in zip((4e-3, 2e-3, 1e-3), components, strict=True)
+    ]
+    found = convergence(scene, Claim("mine", None, np.float64), ds.METRICS["orientation_error"], series).budget
+    assert (found.cause, found.upper > 5e-3) == ("discretisation", True)
+    assert f"up to {found.upper:.2g} may remain" in found.reason
+
+
 def cause_of(measured, metric="energy_error"):
     """The cause of a ball's error, whose parts at each time step are given: a row for each flight that the step resolves."""
     scene = ds.load("drop-ball")

@@ -152,6 +152,13 @@ def test_error_that_vanishes_very_slowly_is_no_model_error(p):
     assert found.lower <= 0.0 <= found.upper
 
 
+@pytest.mark.parametrize("h", [FIVE, FIVE[:4], np.array([8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5])])
+@pytest.mark.parametrize("p", [0.2, 0.23])
+def test_error_that_grows_without_bound_approaches_no_value(p, h):
+    """As h^-p."""
+    assert ds.error_budget(h, h**-p).cause == "unresolved"
+
+
 def test_errors_near_rounding_are_not_called_sampling_noise():
     """Without any sampling noise."""
     found = ds.error_budget(H, [2.5e-9, -1.5e-9, 2e-9], rounding=1e-9)

@@ -39,7 +39,7 @@ def fall(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         exact.append(facts.fallen(steps * dt))
     free = 0.5 * facts.gravity * (round(FALL / dts[0]) * dts[0]) ** 2
     answers = [judged(body, Answer("fall", "distance in 1 s", "m", physical=free), dts, fallen, exact, OF_FALLS)]
-    if any(facts.falls):
+    if any(facts.falls) and not facts.unknown:
         speed = terminal_speed(facts.gravity * (1.0 - facts.lifted), facts.mass, *facts.falls)
         answers.append(Answer("fall", "terminal speed", "m/s", in_force=speed, physical=math.inf))
     return answers

@@ -134,7 +134,7 @@ def _impact(states: Array, heights: Array, gap: float, dt: float, speed: float, 
 def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The depth of the body at rest, and its speed there: findings if they differ from the exact ones by 1 % of the body's size."""
     facts = body.facts
-    through = Finding("setting", facts.in_file("contype", "conaffinity"), detail=facts.missed)
+    through = Finding("setting", facts.in_file("contype", "conaffinity", "group", "mask"), detail=facts.missed)
     support = [Answer("rest", "support", "", detail="none", findings=(through,))] if facts.missed else []
     if not facts.lands:
         return support

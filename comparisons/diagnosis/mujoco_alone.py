@@ -23,6 +23,9 @@ from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
 from dropspin.scenarios.state import UP, Array
 from dropspin.scenarios.truths.soft_rest import GeomSettings, SoftContact
 
+FLAGS = mujoco.mjtDisableBit
+NO_DAMPER = int(getattr(FLAGS, "mjDSBL_DAMPER", getattr(FLAGS, "mjDSBL_PASSIVE", 0)))
+"""The flag that disables dampers, in older versions with all passive forces."""
 WIDE = 100.0
 """Half the width of a box that a body lands on [m]."""
 
@@ -137,7 +140,7 @@ class MuJoCoAlone:
     def damping(self) -> Array:
         """The coefficients of the joint's damping, of |v| to the powers 0, 1 and 2."""
         old = self.file.model
-        if self.dof is None or "damping" in self._changes:
+        if self.dof is None or "damping" in self._changes or old.opt.disableflags & NO_DAMPER:
             return np.zeros(3)
         return np.array([old.dof_damping[self.dof], *getattr(old, "dof_dampingpoly", np.zeros((old.nv, 2)))[self.dof]])
 

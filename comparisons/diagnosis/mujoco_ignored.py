@@ -13,6 +13,7 @@ from dropspin.comparisons.diagnosis.mjcf_defaults import option_setting
 from dropspin.comparisons.diagnosis.mujoco_elements import children_of
 from dropspin.comparisons.diagnosis.mujoco_file import BODY
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL
+from dropspin.comparisons.diagnosis.mujoco_shapes import is_whole, mesh_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText, differ
 from dropspin.comparisons.diagnosis.source import Ignored, Setting
 from dropspin.comparisons.diagnosis.urdf_file import used_by_neither_engine
@@ -51,7 +52,7 @@ def ignored(text: BodyText, in_force: MassProperties, *, raised: bool, condim: i
             made = f"refused ({text.file.refusal}); measured with balanceinertia" if text.file.refusal else "changed"
             made = made if wanted.any() else "0, with which MuJoCo simulates no body; measured with that of a uniform solid"
             yield _changed(text, "inertia", f"{made}: moments {digits(has.tolist())} kg m²")
-    yield from _miscounted(text)
+    yield from _meshes(text)
     yield from _visual(text)
     if condim == 1 and "friction" in settings:
         yield "friction", settings["friction"], "not used: condim is 1"
@@ -75,19 +76,28 @@ def _friction(text: BodyText, place: int) -> float:
     return float(numbers[place]) if len(numbers) > place else 0.0
 
 
-def _miscounted(text: BodyText) -> Iterator[Ignored]:
-    """A mass that is not that of the volumes of the body's meshes."""
+def _meshes(text: BodyText) -> Iterator[Ignored]:
+    """Meshes of the body that are read in part, and a mass that is not that of their volumes."""
+    model = text.model
+    geoms = [int(geom) for geom in np.flatnonzero(np.isin(model.geom_bodyid, text.group)) if model.geom_dataid[geom] >= 0]
+    names = {geom: mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MESH, model.geom_dataid[geom]) for geom in geoms}
+
+    def words(*used: str) -> Setting:
+        every, key = list(text.file.source.every("mesh")), "filename" if text.file.is_urdf else "file"
+        meshes = [mesh for mesh in every if mesh.attributes.get("name", Path(mesh.attributes.get(key, "")).stem) in used]
+        return meshes[0].words if meshes else Setting("a mesh")
+
+    for geom, name in names.items():
+        points, faces = mesh_of(model, geom)
+        if not is_whole(points, faces):
+            made = (
+                f"read in part: all of its {len(points)} vertices collide, but mass and inertia are those of the first object of its file"
+            )
+            yield "mesh", words(name), made
     has, exact = text.properties(text.file.compiled), text.properties(text.file.recompiled.exact)
     if has is not None and exact is not None and abs(has.mass - exact.mass) > NOTEWORTHY * exact.mass:
-        used = {
-            mujoco.mj_id2name(text.model, mujoco.mjtObj.mjOBJ_MESH, text.model.geom_dataid[geom])
-            for geom in np.flatnonzero(np.isin(text.model.geom_bodyid, text.group))
-            if text.model.geom_dataid[geom] >= 0
-        }
-        every = list(text.file.source.every("mesh"))
-        meshes = [mesh for mesh in every if mesh.attributes.get("name", Path(mesh.attributes.get("file", "")).stem) in used]
         made = f'counted as {has.mass:.4g} kg by default; its volume has {exact.mass:.4g} kg, which inertia="exact" gives'
-        yield "mesh", meshes[0].words if meshes else Setting("a mesh"), made
+        yield "mesh", words(*names.values()), made
 
 
 def _of_links(text: BodyText) -> Iterator[Ignored]:

@@ -58,6 +58,8 @@ WRITTEN = (
     ("rolling_friction", "value", "rolling"),
     ("inertia", "ixx", "inertia"),
     ("mass", "value", "mass"),
+    ("collision", "group", "group"),
+    ("collision", "mask", "mask"),
     ("stiffness", "value", "stiffness"),
 )
 """Elements and attributes of URDF, and the names of their settings."""
@@ -194,7 +196,7 @@ class PyBulletBody(LooseBody):
             pose=Z_TO_Y,
             resistance=self._resistance(own, kappa),
             falls=Drag(kappa * mass, kappa * mass),
-            surface=SURFACE if parts else "",
+            surface=SURFACE if any(part.collides for part in parts) else "",
             friction=touching[0].dynamics[1] * plane[1] if len(frictions) == 1 else math.nan,
             restitution=touching[0].restitution * plane[5] if is_hard and len(restitutions) == 1 else None,
             margin=margin,
@@ -203,6 +205,9 @@ class PyBulletBody(LooseBody):
             written=None if written is None or len(self._links) > 1 else MassProperties(mass, np.zeros(3), written),
             settings=self._settings(touching[0]),
             ignored=self._ignored(plane[5]),
+            missed=""
+            if any(part.collides for part in parts) or not parts
+            else f"{SURFACE}: its collision group and mask exclude static bodies",
             unmodelled=["joints"] if len(self._model.heads) > 1 else [],
         )
         if not parts or any(answer.findings for answer in inertia(facts)):

@@ -22,6 +22,8 @@ from dropspin.scenarios.state import Array
 from dropspin.scenarios.text import printable
 
 MARGIN = 1e-3  # m; what Bullet adds to convex hulls
+STATIC = 2
+"""Bullet's collision group of static bodies, whose mask excludes it."""
 SAME = 0.01
 """Relative difference up to which a moment of inertia is the one that was written."""
 OF_CONTACT = ("friction", "lateral_friction", "restitution", "rolling_friction", "spinning_friction")
@@ -68,6 +70,14 @@ class Link(NamedTuple):
             return None
         return self._turned(np.array(symmetric([element.number(name, 0.0) for name in OF_URDF])))
 
+    @property
+    def collides(self) -> bool:
+        """Whether its collision group or mask lets it collide with a static body, by PyBullet's defaults; the last ones written count."""
+        group, mask = 1, -1
+        for element in self.element.every("collision"):
+            group, mask = int(element.number("group", group)), int(element.number("mask", mask))
+        return bool(group & ~STATIC or mask & STATIC)
+
     def _turned(self, tensor: Array) -> Array:
         axes = rotate(self.turn, np.eye(3)).T
         turned: Array = axes @ tensor @ axes.T
@@ -90,7 +100,7 @@ class Link(NamedTuple):
                 position = origin + rotate(turn, np.array(place)) - centre + rotate(turns, shape.centre)
                 name = element.attributes.get("name", self.element.attributes["name"])
                 along = multiply(turns, conjugate(Z_TO_Y)) if isinstance(shape, Capsule | Cylinder) else turns
-                yield Part(name, shape, position, along, collides=not visual)
+                yield Part(name, shape, position, along, collides=self.collides and not visual)
             elif not visual:
                 raise DropspinError(f"{file.given}: line {element.line}: a geometry that is not a solid of finite size.")
 

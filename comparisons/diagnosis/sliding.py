@@ -9,7 +9,7 @@ import numpy as np
 from dropspin.comparisons.diagnosis.answers import KEPT, MOVES, OF_FALLS, TIPS, UNTURNED, WATCHED, Answer, judged
 from dropspin.comparisons.diagnosis.landing import is_at_rest, tilt
 from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
-from dropspin.scenarios.rotations import rotate, unrotate
+from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.damped_joint import spin_about_axis
 
@@ -21,6 +21,10 @@ SHORT = 0.1
 CENTRAL = 1e-9
 """Distance of the middle of a ball from the centre of mass, relative to its radius, that is attributed to rounding."""
 STOPPED = 1e-3  # m/s, of a ball that rolled at 1 m/s
+MARGINAL = 1.01
+"""Ratio of the two levers up to which a body, such as a cube with a coefficient of friction of 1, is not said to tip."""
+LEANING = 1e-4
+"""Angle by which the lever of the weight about the leading edge is found [rad]."""
 WAYS = ("0°", "45°")
 """Directions of a slide, from an axis of the surface."""
 
@@ -39,6 +43,8 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     end = body.settled[-1:]
     rests = [body.motions(end, dt, math.ceil(WATCHED / dt), -facts.gravity * UP, floor=True)[0, -1] for dt in dts]
     half = math.sqrt(0.5)
+    if any(_is_tipped(facts, end[0], np.array(direction)) for direction in ((1.0, 0.0, 0.0), (half, 0.0, half))):
+        return [replace(blank, direction=way, detail=TIPS) for way in WAYS]
     least = float(np.nanmin([facts.friction, facts.friction_across]))
     longest = SLIDE**2 / (2.0 * LONGEST_SLIDE * facts.gravity)  # the friction of the longest slide
     along = _stops(body, dts, rests, np.array([1.0, 0.0, 0.0]), facts.friction)
@@ -77,6 +83,15 @@ def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direct
         moved = states[-1, POSITION] - start[POSITION] + rotate(states[-1, ORIENTATION], foot) - rotate(start[ORIENTATION], foot)
         found.append(float(np.hypot(moved[0], moved[2])))  # friction that differs between directions turns the motion
     return found
+
+
+def _is_tipped(facts: Facts, rest: Array, direction: Array) -> bool:
+    """Whether friction turns a rigid body that slides in a direction over its leading edge: at first its weight has the shorter arm."""
+    turns = multiply(about(np.cross(UP, direction), np.array([0.0, LEANING])), rest[ORIENTATION])
+    states = np.zeros((2, 13))
+    states[:, ORIENTATION] = turns
+    height, leaning = -facts.lowest(states)  # of the centre of mass, which rises as the body leans
+    return facts.friction * height > MARGINAL * (leaning - height) / LEANING
 
 
 def _stop(facts: Facts) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.model_files import FREE, body_of, findings_of, ladder
 
-from dropspin.comparisons.diagnosis.answers import COEFFICIENT, MOVES, REBOUND, Answer
+from dropspin.comparisons.diagnosis.answers import COEFFICIENT, MOVES, REBOUND, TIPS, Answer
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
@@ -188,3 +188,11 @@ def test_one_change_is_given_for_a_restitution_at_all_speeds(tmp_path, wanted, s
     missed = [answer.findings[0].remedies for answer in Targets(wanted).judged(body, impact(body, ladder(body))) if answer.findings]
     assert {remedy.text for remedies in missed for remedy in remedies} == {body.patch(body.for_restitution(wanted, step), step)}
     assert [remedy.value for [remedy] in missed] == pytest.approx([wanted] * 3, abs=0.01)
+
+
+def test_tall_box_that_friction_turns_over_its_edge_has_no_stopping_distance(tmp_path):
+    """Of 2 h on 2 b, with µ > b/h: MuJoCo's own tips by degrees, and stops after 4 to 7 mm, not v²/2µg = 13 mm."""
+    for height, tips in ((0.12, True), (0.05, False)):
+        world = FREE.format(f'<geom name="g" type="box" size=".1 .1 {height}" mass="1"/>')
+        body = body_of(tmp_path, world, 'cone="elliptic" impratio="10"')
+        assert [answer.detail == TIPS for answer in slide(body, ladder(body))] == [tips] * 2

@@ -379,3 +379,41 @@ def test_mass_of_geometries_that_the_file_gives_no_mass_is_named(tmp_path):
     found = body_of(tmp_path, text, file="model.urdf").facts.ignored
     missing = [(setting.text, made) for name, setting, made in found if name == "inertial"]
     assert missing == [("no inertial in link c", "missing: the mass is 1.2 kg, that of the geometries at the default density")]
+
+
+def test_disabled_dampers_do_not_damp(tmp_path):
+    """`<flag damper="disable"/>`: the spin of 10 rad/s stays."""
+    world = f'<body name="b" pos="0 0 1"><joint type="free" damping="1"/>{BOX}</body>'
+    body = body_of(tmp_path, world, head='<option><flag damper="disable"/></option>')
+    assert [answer.measured for answer in spin(body, ladder(body))] == pytest.approx([1.0] * 3)
+    assert [answer.in_force for answer in spin(body, ladder(body))] == pytest.approx([1.0] * 3)
+
+
+def test_terminal_speed_is_not_that_of_the_damping_alone_in_air(tmp_path):
+    """The drag of the air limits the speed to far less."""
+    damped = f'<body name="b" pos="0 0 1"><joint type="free" damping="1e-3"/>{BOX}</body>'
+    for option, count in (("", 1), ('density="1.2"', 0)):
+        answers = fall(body := body_of(tmp_path, damped, option), ladder(body))
+        assert [answer.quantity for answer in answers].count("terminal speed") == count
+
+
+CORNERS = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+FACES = ["1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4"]
+
+
+def cube(number):
+    """A cube of 1 m of an OBJ file, beside the last one."""
+    corners = [f"v {x + number} {y} {z}" for x, y, z in CORNERS]
+    faces = ["f " + " ".join(str(int(index) + 8 * number) for index in face.split()) for face in FACES]
+    return "\n".join([f"o cube{number}", *corners, *faces])
+
+
+def test_mesh_of_several_objects_has_the_mass_of_the_first_one(tmp_path):
+    """Two cubes of 1 m side by side: MuJoCo's mass is that of one, and both collide."""
+    (tmp_path / "two.obj").write_text(f"{cube(0)}\n{cube(1)}\n")
+    mesh = '<asset><mesh name="m" file="two.obj"/></asset>'
+    body = body_of(tmp_path, FREE.format('<geom name="g" type="mesh" mesh="m" density="1"/>'), head=mesh)
+    assert body.facts.mass == pytest.approx(1.0)
+    [(name, words, made)] = body.facts.ignored
+    assert (name, "two.obj" in str(words), made.startswith("read in part: all of its 16 vertices collide")) == ("mesh", True, True)
+    assert body.facts.solid is None

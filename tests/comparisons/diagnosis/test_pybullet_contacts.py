@@ -1,6 +1,7 @@
 """Contacts of bodies of URDF files as PyBullet has them."""
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -8,6 +9,7 @@ pytest.importorskip("pybullet", exc_type=ImportError)
 
 from support.urdf_files import BOX, body, joint, link, two_links
 
+from dropspin.comparisons.diagnosis.landing import rest
 from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
 from dropspin.comparisons.diagnosis.sliding import slide
 
@@ -51,3 +53,26 @@ def test_slide_on_a_soft_contact_of_the_file_is_due_to_the_contact(tmp_path):
         assert [(one.text, one.value) for one in found.remedies] == [
             (box.patch({"stiffness": "none"}, STEP), pytest.approx(0.0201, rel=1e-2))
         ]
+
+
+@pytest.mark.parametrize(
+    ("filters", "falls"),
+    [('group="0" mask="0"', True), ('group="2" mask="1"', True), ('group="0"', False), ('mask="1"', False), ("", False)],
+)
+def test_link_whose_collision_filter_excludes_static_bodies_falls_through_the_floor(tmp_path, filters, falls):
+    """By its group and its mask, as in PyBullet alone; no smaller step prevents it."""
+    block = body(tmp_path, link(BOX, "0.05").replace("<collision", f"<collision {filters}"))
+    through = [finding for answer in rest(block, (STEP,)) for finding in answer.findings if answer.quantity == "support"]
+    assert bool(through) == falls
+    assert all("exclude static bodies" in finding.detail for finding in through)
+    import pybullet
+    import pybullet_data
+
+    client = pybullet.connect(pybullet.DIRECT)
+    pybullet.loadURDF(str(Path(pybullet_data.getDataPath(), "plane.urdf")), physicsClientId=client)
+    number = pybullet.loadURDF(str(tmp_path / "model.urdf"), [0.0, 0.0, 1.0], physicsClientId=client)
+    pybullet.setGravity(0, 0, -9.81, client)
+    for _ in range(480):
+        pybullet.stepSimulation(client)
+    assert (pybullet.getBasePositionAndOrientation(number, client)[0][2] < -1.0) == falls
+    pybullet.disconnect(client)

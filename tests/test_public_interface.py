@@ -134,6 +134,17 @@ def test_repr_of_an_error_budget_is_a_sentence(errors, start):
     assert (f", the order {found.order:.2f} (" in repr(found)) == np.isfinite(found.order) == (found.cause in ("model", "discretisation"))
 
 
+def test_an_engine_may_have_its_name_from_its_constructor():
+    class Named(made.Exact):
+        def __init__(self, name):
+            super().__init__()
+            object.__setattr__(self, "name", name)
+
+    assert ds.run("spin-principal", Named("flyer"), dt=0.01).engines == ("flyer",)
+    with pytest.raises(ds.DropspinError, match=r"Named\.name is 'wang', which is a built-in engine"):
+        ds.run("spin-principal", Named("wang"), dt=0.01)
+
+
 @pytest.mark.parametrize("dt", [np.float32(0.01), [np.float32(0.01)], np.array([0.01])])
 def test_a_time_step_may_be_a_number_of_numpy(dt):
     assert ds.run("spin-principal", "wang", dt=dt).table["dt"].dropna().unique() == pytest.approx([0.01])

@@ -192,13 +192,12 @@ def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
         raise UnknownName(f"{module_name}'s engine", attribute, known) from None
     if not _is_engine(adapter):
         raise DropspinError(f"engine {name!r}: {attribute} is not an engine; an engine is a class that inherits from dropspin.Engine.")
-    verify_name(adapter, f"engine {name!r}: {attribute}")
+    verify_name(getattr(adapter, "name", ""), adapter, f"engine {name!r}: {attribute}")
     return adapter
 
 
-def verify_name(adapter: type[Engine], where: str) -> None:
-    """Raise `DropspinError` if results cannot have the name of a class of engines, or if it is that of another, built-in engine."""
-    given = getattr(adapter, "name", "")
+def verify_name(given: object, adapter: type[Engine], where: str) -> None:
+    """Raise `DropspinError` if results cannot have the name of an engine of a class, or if it is that of another, built-in engine."""
     if not isinstance(given, str) or not re.fullmatch(r"[A-Za-z][\w-]*", given, re.ASCII):
         why = "give it a name for results, of letters, digits, - and _, such as 'my-engine'"
         raise DropspinError(f"{where}.name is {shown(given)}; {why}.")

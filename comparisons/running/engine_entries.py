@@ -25,7 +25,7 @@ def engine_entry(engine: Engine | str, resources: ResourceLimits = ONE_MINUTE) -
         DropspinError: There is no engine of that name, or it is neither an engine nor a name.
     """
     if isinstance(engine, Engine):
-        verify_name(type(engine), f"engine: {type(engine).__qualname__}")
+        verify_name(getattr(engine, "name", ""), type(engine), f"engine: {type(engine).__qualname__}")
         return EngineEntry(engine.label, engine)
     if not isinstance(engine, str):
         raise DropspinError(f"engine: got {described_value(engine)}; give a name such as 'mujoco', or an Engine.")

@@ -124,7 +124,8 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
         tried.append((interval / division, run[0]))
         spent += run[1]
         undefined = run[2] or undefined
-        if stalled := _stalled([errors[0] for _, errors in tried if np.isfinite(errors[0])], METRICS[metrics[0]].unit):
+        stalled = _stalled([errors[0] for _, errors in tried if np.isfinite(errors[0])])
+        if stalled and not _has_large_angle(metrics, run[0]):
             ended, reason = "error_stopped_falling", f"at the last {stalled} time steps the error fell by less than a fifth each"
             break
         if spent >= budget:
@@ -135,10 +136,12 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
     return Ladder(entry.label, steps, ended, reason, left_out, verdict, undefined)
 
 
-def _stalled(errors: Sequence[float], unit: str) -> int:
-    """The number of last time steps over which the errors have stopped falling; 0 if they still fall or may fall, or are too few."""
-    if unit == "rad" and errors and errors[-1] > LARGE_ANGLE:
-        return 0
+def _has_large_angle(metrics: Sequence[str], errors: Sequence[float]) -> bool:
+    return any(METRICS[metric].unit == "rad" and error > LARGE_ANGLE for metric, error in zip(metrics, errors, strict=True))
+
+
+def _stalled(errors: Sequence[float]) -> int:
+    """The number of last time steps over which the errors have stopped falling; 0 if they still fall, or if there are too few."""
     patience = PATIENCE if errors and errors[-1] < SMALL else PATIENCE_WHILE_LARGE
     stays = len(errors) > FEWEST_POINTS and all(later >= NO_BETTER * earlier for earlier, later in pairwise(errors[-patience - 1 :]))
     return patience if stays else 0

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
+from itertools import combinations
 from typing import NamedTuple
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, NOTEWORTHY, REBOUND, Answer, Finding, Kind, Remedy
@@ -130,14 +131,20 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
     """A finding with the changes that remove it, each with the value measured; the finding is then of what the first one changes."""
     found: dict[tuple[str, ...], Remedy] = {}
     changed: set[str] = set()
+    exact = answer.physical if math.isnan(answer.in_force) else answer.in_force
     for settings, step in _tries(body, answer, finding):
         changes = body.changes(settings)
         if settings in found or (len(settings) > 1 and found) or body.patch(changes, step) in {one.text for one in found.values()}:
             continue
         may_stay = not finding.is_error or (finding.kind == "time step" and not settings)
         for other in again(settings, step):
+            if finding.is_error and abs(other.measured - exact) > abs(answer.measured - exact):
+                continue  # a finding may also end because a smaller step is judged by another one
             stays = abs(other.measured - other.in_force) > MOST * abs(answer.measured - answer.in_force)
-            if (may_stay or not stays) and not any(one.is_error == finding.is_error or body.facts.unknown for one in other.findings):
+            # At rest, an error at one time step alone is not known to be one of the step.
+            is_wrong = answer.question == "rest" and any(one.settings != ("margin",) for one in other.findings)
+            remains = is_wrong or any(one.is_error == finding.is_error or body.facts.unknown for one in other.findings)
+            if (may_stay or not stays) and not remains:
                 found[settings] = Remedy(body.patch(changes, step), other.measured, other.unit, *body.elsewhere(step, changes))
                 changed = changed or {*changes, *["timestep"] * (step != body.facts.dt)}
     if not found and finding.is_error:
@@ -163,6 +170,8 @@ def _tries(body: LooseBody, answer: Answer, finding: Finding) -> Iterator[tuple[
         scale = 100.0 if answer.unit == "%" else abs(answer.in_force) or 1.0
         excess = math.inf if answer.question == "rest" else abs(answer.measured - answer.in_force) / scale / NOTEWORTHY
         yield (), _rounded(dt * (max(SAFE / excess, SHORTEST) if 1.0 < excess < math.inf else 0.25))
+    if finding.kind == "model":
+        yield from ((pair, dt) for pair in combinations(known, 2))
     together = tuple(name for name in known if name not in body.causes.get(answer.question, ()))
     if len(together) > 1 and not finding.is_error:
         yield together, dt

@@ -199,12 +199,13 @@ def test_friction_that_depends_on_the_direction(tmp_path):
 
 
 def test_short_slide_with_a_large_error_is_a_finding(tmp_path):
-    """A contact that bounces: the elliptic cone does not mend it, and is no remedy; the default contact mends the slide along an axis."""
+    """A contact that bounces: the default contact mends the slide along an axis, and with the elliptic cone the one at 45 degrees."""
     body = body_of(tmp_path, FREE.format(BOX.replace("/>", ' solref="-1e4 -10"/>')))
     found = findings_of(body, slide)
-    [(along, of_contact), (diagonal, of_engine)] = found
+    [(along, of_contact), (diagonal, of_both)] = found
     assert (along.direction, of_contact.kind, of_contact.settings) == ("0°", "setting", ("solref",))
-    assert (diagonal.direction, of_engine.kind, of_engine.remedies) == ("45°", "model", ())
+    assert (diagonal.direction, of_both.kind, of_both.settings) == ("45°", "setting", ("cone", "solref"))
+    assert of_both.remedies[0].value == pytest.approx(of_contact.remedies[0].value, rel=0.05)
 
 
 def test_stiffness_and_the_direction_of_gravity_are_left_out_and_named(tmp_path):
@@ -417,3 +418,13 @@ def test_mesh_of_several_objects_has_the_mass_of_the_first_one(tmp_path):
     [(name, words, made)] = body.facts.ignored
     assert (name, "two.obj" in str(words), made.startswith("read in part: all of its 16 vertices collide")) == ("mesh", True, True)
     assert body.facts.solid is None
+
+
+@pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass' is deprecated")
+def test_inertia_of_a_solid_is_that_of_the_mass_in_the_file(tmp_path):
+    """`settotalmass` multiplies both: the inertia for the mass in force would be as impossible."""
+    world = FREE.format('<inertial pos="0 0 0" mass="0.3" diaginertia="3e-4 1e-4 1e-4"/><geom type="box" size=".1 .05 .03"/>')
+    body = body_of(tmp_path, world, head='<compiler settotalmass="10" balanceinertia="true"/>')
+    [answer] = impossible(body)
+    assert body.facts.mass == pytest.approx(10.0)
+    assert "ixx, iyy, izz = 0.00034, 0.00109, 0.00125 kg m²" in answer.findings[0].remedies[0].text

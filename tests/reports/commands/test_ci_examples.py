@@ -79,13 +79,13 @@ def test_texts_of_inputs_are_no_commands(tmp_path):
     planted = "$(touch planted)`touch planted`'; touch planted; \""
     _, measure, _ = github_steps(engines=planted, scenes=planted, **{"time-steps": planted}, output=f"out{planted}")
     done = run_steps([measure], tmp_path, "good", PATH=HERE)
-    assert done.returncode == 2
+    assert done.returncode == 1
     assert "is not a valid float" in done.stderr
     assert list(tmp_path.iterdir()) == []
     assert not any("${{" in step["run"] for step in ACTION["runs"]["steps"] if "run" in step)
 
 
-@pytest.mark.parametrize(("complete", "given"), [("true", True), ("false", False)])
+@pytest.mark.parametrize(("complete", "given"), [("true", True), ("True", True), ("false", False)])
 def test_action_can_ask_for_every_accepted_result(complete, given, tmp_path):
     (tmp_path / "dropspin").write_text("#!/bin/sh\necho $*\n")
     (tmp_path / "dropspin").chmod(0o755)
@@ -95,14 +95,18 @@ def test_action_can_ask_for_every_accepted_result(complete, given, tmp_path):
     assert done.stdout.endswith(" --complete\n") == given
 
 
-@pytest.mark.parametrize(("code", "judged"), [(0, True), (1, True), (3, True), (2, False), (137, False)])
-def test_action_judges_failed_runs_and_removes_no_files(code, judged, tmp_path):
-    (tmp_path / "dropspin").write_text(f"#!/bin/sh\nexit {code}\n")
-    (tmp_path / "dropspin").chmod(0o755)
+@pytest.mark.parametrize(
+    ("writes", "code", "judged"), [(True, 0, True), (True, 1, True), (True, 3, True), (False, 1, False), (False, 2, False)]
+)
+def test_action_judges_failed_runs_that_are_written_and_removes_no_files(writes, code, judged, tmp_path):
+    """An older run is not judged in place of one that was not written."""
     (tmp_path / "run").mkdir()
+    (tmp_path / "run/run.json").touch()
+    (tmp_path / "dropspin").write_text(f"#!/bin/sh\n{'sleep 0.1; touch run/run.json' * writes}\nexit {code}\n")
+    (tmp_path / "dropspin").chmod(0o755)
     _, measure, _ = github_steps(output=".")
-    assert run_steps([measure], tmp_path, "good", PATH=f"{tmp_path}{os.pathsep}{HERE}").returncode == (0 if judged else code)
-    assert (tmp_path / "run").is_dir()
+    assert (run_steps([measure], tmp_path, "good", PATH=f"{tmp_path}{os.pathsep}{HERE}").returncode == 0) == judged
+    assert (tmp_path / "run/run.json").is_file()
 
 
 def test_actions_of_others_are_named_by_their_commits():

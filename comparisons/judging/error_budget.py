@@ -171,8 +171,7 @@ def error_budget(
     order, fitted = fitted_order(h, e if cause == "discretisation" else e - limit[0], small)
     is_slow = cause == "model" and order < ORDERS[0] and max(limit[1], -limit[2]) < abs(float(e[-1]) - limit[0])
     is_early = cause == "model" and abs(limit[0]) <= abs(float(e[-1])) and falls_ever_faster(h, e, small)
-    grows_ever_faster = cause == "model" and falls_ever_faster(h, 2.0 * e[-1] - e, small)  # mirrored at the finest error
-    if is_slow or is_early or grows_ever_faster:
+    if is_slow or is_early:
         cause, limit = "unresolved", (limit[0], min(limit[1], 0.0), max(limit[2], 0.0))
     in_units = unit * limit[0], unit * limit[1], unit * limit[2]
     if cause == "unresolved":
@@ -181,6 +180,8 @@ def error_budget(
     orders = (min(posterior.order_lower, order), max(posterior.order_upper, order)) if has_order else (math.nan, math.nan)
     found = ErrorBudget(cause, "approaches a value other than 0", *in_units, order, *orders, fitted)
     if cause == "model":
+        if falls_ever_faster(h, 2.0 * e[-1] - e, small):  # mirrored at the finest error
+            return replace(found, reason="grows faster at each finer time step, and may approach no value")
         return replace(found, reason=found.reason + _power(found))
     return widened(found, found.upper, unit * abs(float(e[-1])), unit * negligible)
 

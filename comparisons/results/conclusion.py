@@ -135,7 +135,7 @@ def _answer(
     `limits` has the relative size of the asymptotic error by scene, where it is beyond the tolerance.
     """
     finest = series.loc[series.groupby("scene", sort=False)["dt"].idxmin()].set_index("scene", drop=False)
-    grows = finest.index[(finest["state"] == "within") & finest["scene"].isin(limits.index)]
+    grows = finest.index[(finest["state"] != "beyond") & finest["scene"].isin(limits.index)]
     finest.loc[grows, "state"], finest.loc[grows, "size"] = "beyond", limits[grows]
     of = {state: tuple(finest.loc[finest["state"] == state, "scene"]) for state in ("within", "beyond", "undecided")}
     kept = series[series["scene"].isin(of["within"])]

@@ -155,8 +155,18 @@ def test_error_that_vanishes_very_slowly_is_no_model_error(p):
 @pytest.mark.parametrize("h", [FIVE, FIVE[:4], np.array([8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5])])
 @pytest.mark.parametrize("p", [0.2, 0.23])
 def test_error_that_grows_without_bound_approaches_no_value(p, h):
-    """As h^-p."""
-    assert ds.error_budget(h, h**-p).cause == "unresolved"
+    """As h^-p; it does not vanish either."""
+    found = ds.error_budget(h, h**-p)
+    assert (found.cause, found.reason.split(",")[0]) in {
+        ("model", "grows faster at each finer time step"),
+        ("unresolved", found.reason.split(",")[0]),
+    }
+    assert "approaches" not in found.reason
+
+
+@pytest.mark.parametrize(("h", "errors"), [(H, [1.0, 1.0003, 1.0015]), (FIVE, 1.0 + 0.003 / FIVE)])
+def test_model_error_with_a_drift_that_grows_stays_a_model_error(h, errors):
+    assert ds.error_budget(h, errors).cause == "model"
 
 
 def test_errors_near_rounding_are_not_called_sampling_noise():

@@ -21,7 +21,7 @@ def inertia(facts: Facts) -> list[Answer]:
     """The moments in force beside those of a solid; what is impossible in those of the file, or of the engine if the file has none."""
     solid, given = facts.solid, facts.written or MassProperties(facts.mass, facts.offset, facts.inertia)
     # Of the mass that the file has: what the engine changes, it changes also with the remedy.
-    of_file = solid if solid is None else solid._replace(mass=given.mass, inertia=given.mass / facts.mass * solid.inertia)
+    of_file = solid if solid is None or not given.mass else solid._replace(mass=given.mass, inertia=given.mass / facts.mass * solid.inertia)
     answers = list(_impossible(facts, given, of_file))
     for number, axis in enumerate(facts.principal[1].T):
         of_solid = math.nan if solid is None else float(axis @ solid.inertia @ axis)

@@ -90,10 +90,8 @@ def _meshes(text: BodyText) -> Iterator[Ignored]:
     for geom, name in names.items():
         points, faces = mesh_of(model, geom)
         if not is_whole(points, faces):
-            made = (
-                f"read in part: all of its {len(points)} vertices collide, but mass and inertia are those of the first object of its file"
-            )
-            yield "mesh", words(name), made
+            made = "but mass and inertia are those of the first object of its file"
+            yield "mesh", words(name), f"read in part: all of its {len(points)} vertices collide, {made}"
     has, exact = text.properties(text.file.compiled), text.properties(text.file.recompiled.exact)
     if has is not None and exact is not None and abs(has.mass - exact.mass) > NOTEWORTHY * exact.mass:
         made = f'counted as {has.mass:.4g} kg by default; its volume has {exact.mass:.4g} kg, which inertia="exact" gives'

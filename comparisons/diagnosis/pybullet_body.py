@@ -183,6 +183,7 @@ class PyBulletBody(LooseBody):
         margin = MARGIN if any(part.shape.shape == "mesh" for part in bottom) else 0.0
         frictions, restitutions = {link.dynamics[1] for link in touching}, {(link.restitution, link.dynamics[9]) for link in touching}
         is_hard = all(link.dynamics[9] < 0.0 for link in touching)  # a spring and damper have no restitution
+        is_held = any(part.collides for part in parts)
         facts = Facts(
             name=self._name,
             engine="PyBullet",
@@ -196,7 +197,7 @@ class PyBulletBody(LooseBody):
             pose=Z_TO_Y,
             resistance=self._resistance(own, kappa),
             falls=Drag(kappa * mass, kappa * mass),
-            surface=SURFACE if any(part.collides for part in parts) else "",
+            surface=SURFACE if is_held else "",
             friction=touching[0].dynamics[1] * plane[1] if len(frictions) == 1 else math.nan,
             restitution=touching[0].restitution * plane[5] if is_hard and len(restitutions) == 1 else None,
             margin=margin,
@@ -205,9 +206,7 @@ class PyBulletBody(LooseBody):
             written=None if written is None or len(self._links) > 1 else MassProperties(mass, np.zeros(3), written),
             settings=self._settings(touching[0]),
             ignored=self._ignored(plane[5]),
-            missed=""
-            if any(part.collides for part in parts) or not parts
-            else f"{SURFACE}: its collision group and mask exclude static bodies",
+            missed=f"{SURFACE}: its collision group and mask exclude static bodies" if parts and not is_held else "",
             unmodelled=["joints"] if len(self._model.heads) > 1 else [],
         )
         if not parts or any(answer.findings for answer in inertia(facts)):

@@ -131,10 +131,9 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     budget = length if vector is None else _corrected(length, vector, abs(float(errors[at])), max(floor, float(rounded[at])))
     order_tolerance = math.nan
     if budget.dts and metric.name not in JUMPING:
-        used = np.isin(dts, budget.dts)
+        used, limit = np.isin(dts, budget.dts), 0.0 if length.cause == "discretisation" else length.asymptotic_error
         logs = np.log(dts[used]) - np.mean(np.log(dts[used]))
-        fitted = errors if length.cause == "discretisation" else errors - length.asymptotic_error
-        shares = np.array([point.tolerance for point in series])[used] / np.abs(fitted[used])
+        shares = np.array([point.tolerance for point in series])[used] / np.abs(errors[used] - limit)
         order_tolerance = float(np.sum(np.abs(logs) * shares) / np.sum(logs**2))
     deciding = budget if vector is None or budget.cause != "discretisation" else vector
     is_open = deciding.cause == "unresolved" and has_value and float(np.nanmax(np.abs(errors))) > floor

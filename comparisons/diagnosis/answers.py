@@ -101,6 +101,11 @@ class Answer:
     detail: str = ""
 
     @property
+    def exact(self) -> float:
+        """The exact value with the settings of the file, or without damping, armature and margin if that one is not known."""
+        return self.physical if math.isnan(self.in_force) else self.in_force
+
+    @property
     def effect(self) -> float:
         """The measured value, and of a decay its rate [1/s]: quantities to which settings contribute in proportion."""
         if self.quantity == DECAY_TIME:

@@ -13,6 +13,8 @@ from dropspin.scenarios.bodies.mesh_files import Faces
 from dropspin.scenarios.rotations import cross, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 
+PART = 0.01
+"""Share of a mesh's size from which vertices beyond its triangles are no rounding."""
 AXES = np.eye(3)
 TURNS = np.arange(150) * math.pi * (3.0 - math.sqrt(5.0))
 HEIGHTS = 1.0 - 2.0 * (np.arange(150) + 0.5) / 150
@@ -83,5 +85,12 @@ def solid(shape: str, **sizes: Any) -> Shape:
 
 
 def mesh_shape(points: Array, faces: Faces) -> Shape:
-    """A mesh as a solid, or as a surface if it is not closed."""
-    return solid("mesh", points=points, faces=faces, **({} if is_closed(points, faces) else {"inertia": "surface"}))
+    """A mesh as a solid, or as a surface if it is not closed or has vertices beyond its triangles."""
+    is_solid = is_closed(points, faces) and is_whole(points, faces)
+    return solid("mesh", points=points, faces=faces, **({} if is_solid else {"inertia": "surface"}))
+
+
+def is_whole(points: Array, faces: Faces) -> bool:
+    """Whether the triangles of a mesh reach as far as its vertices; MuJoCo has those of the first object of an OBJ file alone."""
+    size = np.ptp(points, axis=0)
+    return bool(np.allclose(np.ptp(points[np.unique(faces)], axis=0), size, rtol=0.0, atol=PART * size.max()))

@@ -8,12 +8,13 @@ import mujoco
 import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, digits
+from dropspin.comparisons.diagnosis.geometries import is_whole
 from dropspin.comparisons.diagnosis.loose_body import MassProperties
 from dropspin.comparisons.diagnosis.mjcf_defaults import option_setting
 from dropspin.comparisons.diagnosis.mujoco_elements import children_of
 from dropspin.comparisons.diagnosis.mujoco_file import BODY
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL
-from dropspin.comparisons.diagnosis.mujoco_shapes import is_whole, mesh_of
+from dropspin.comparisons.diagnosis.mujoco_shapes import mesh_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText, differ
 from dropspin.comparisons.diagnosis.source import Ignored, Setting
 from dropspin.comparisons.diagnosis.urdf_file import used_by_neither_engine

@@ -14,8 +14,6 @@ MODELLED = [int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}")) for kind in ("SPHERE"
 """The kinds of geometries of bodies."""
 ALONG = 1e-3
 """Cosine up to which a direction is along a plane, and not into it."""
-PART = 0.01
-"""Share of a mesh's size from which vertices beyond its triangles are no rounding."""
 STRAIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 
 
@@ -28,8 +26,7 @@ def shape_of(model: Any, number: int) -> tuple[Shape, Array, Array]:
     """A geometry as a solid of 1 kg, with its centre [m] and its orientation in the frame of the geometry."""
     size, name = model.geom_size[number].tolist(), kind_of(model, number)
     if name == "mesh":
-        points, faces = mesh_of(model, number)
-        shape = mesh_shape(points, faces) if is_whole(points, faces) else solid("mesh", points=points, faces=faces, inertia="surface")
+        shape = mesh_shape(*mesh_of(model, number))
         return shape, shape.centre, STRAIGHT
     if name in ("capsule", "cylinder"):  # along y here
         return solid(name, radius=size[0], half_length=size[1]), np.zeros(3), np.roll(UPWARD, -1)
@@ -42,12 +39,6 @@ def mesh_of(model: Any, geom: int) -> tuple[Array, Any]:
     first, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
     points = model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float)
     return points, model.mesh_face[face : face + model.mesh_facenum[mesh]].astype(np.int64)
-
-
-def is_whole(points: Array, faces: Any) -> bool:
-    """Whether the triangles of a mesh reach as far as its vertices; MuJoCo has those of the first object of an OBJ file alone."""
-    size = np.ptp(points, axis=0)
-    return bool(np.allclose(np.ptp(points[np.unique(faces)], axis=0), size, rtol=0.0, atol=PART * size.max()))
 
 
 def quaternion(matrix: Array) -> Array:

@@ -131,14 +131,13 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
     """A finding with the changes that remove it, each with the value measured; the finding is then of what the first one changes."""
     found: dict[tuple[str, ...], Remedy] = {}
     changed: set[str] = set()
-    exact = answer.physical if math.isnan(answer.in_force) else answer.in_force
     for settings, step in _tries(body, answer, finding):
         changes = body.changes(settings)
         if settings in found or (len(settings) > 1 and found) or body.patch(changes, step) in {one.text for one in found.values()}:
             continue
         may_stay = not finding.is_error or (finding.kind == "time step" and not settings)
         for other in again(settings, step):
-            if finding.is_error and abs(other.measured - exact) > abs(answer.measured - exact):
+            if finding.is_error and abs(other.measured - answer.exact) > abs(answer.measured - answer.exact):
                 continue  # a finding may also end because a smaller step is judged by another one
             stays = abs(other.measured - other.in_force) > MOST * abs(answer.measured - answer.in_force)
             # At rest, an error at one time step alone is not known to be one of the step.

@@ -64,8 +64,7 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
 def _of_short_slide(answer: Answer) -> Answer:
     """An answer without the finding of an error that is small for a short slide."""
     is_known = not math.isnan(answer.in_force)
-    exact = answer.in_force if is_known else answer.physical
-    is_small = abs(answer.measured - exact) <= SHORT * exact
+    is_small = abs(answer.measured - answer.exact) <= SHORT * answer.exact
     return replace(answer, findings=tuple(found for found in answer.findings if not is_small or (is_known and not found.is_error)))
 
 

@@ -173,7 +173,8 @@ def load_baseline(path: str | Path) -> Baseline:
     written = validated(_File, where, content)
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
     for_all = {name: one for name, one in written.scenes.items() if isinstance(one, str)}  # older files have no hashes by acceptance
-    scenes = {key: for_all | one for key in acceptances if not isinstance(one := written.scenes.get(key, {}), str)}
+    by_acceptance = {key: one for key, one in written.scenes.items() if not isinstance(one, str)}
+    scenes = {key: for_all | by_acceptance.get(key, {}) for key in acceptances}
     for scene, of_scene in written.results.items():
         if len({*map(current_label, of_scene)}) < len(of_scene):
             raise DropspinError(f"{where}: results of {scene}: an engine is listed by two names; remove the lines of the earlier one.")

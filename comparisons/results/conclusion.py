@@ -18,8 +18,6 @@ WITHIN = 0.01
 """The share of its scale that an error may have, unless another one is asked for."""
 QUESTIONS = ("orientation_error", "bounce_height_error", "energy_error", "angular_momentum_error", "position_error")
 """The metrics that a conclusion may be about, those that are named first where there are many."""
-REMAINING = ("model", "setting")
-"""The causes of an error that does not vanish as dt → 0."""
 ENOUGH = 3
 """Scenes that must test a question before an engine is recommended for it."""
 
@@ -104,7 +102,8 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     is_lost = pd.MultiIndex.from_frame(errors[pair]).isin(pd.MultiIndex.from_frame(lost[pair])) & (errors["metric"] != "position_error")
     states = np.where(is_lost & (states == "within"), "undecided", states)
     found = errors.assign(size=sizes, state=states, cost=errors["time_per_step"] / errors["dt"])
-    remains = table[(table["kind"] == "asymptotic_error") & table["cause"].isin(REMAINING) & ~table["scene"].isin(results.recorded)]
+    remains = results.asymptotic_errors("model", "setting")
+    remains = remains[~remains["scene"].isin(results.recorded)]
     least = remains.assign(value=remains[["lower", "upper"]].abs().min(axis=1))
     remains = remains.assign(size=relative_sizes(remains, results.scenes))[np.array(relative_sizes(least, results.scenes)) > within]
     keys = ["engine", "scene", "dt"]

@@ -19,7 +19,7 @@ from dropspin.comparisons.measuring.contacts import ContactResiduals, contact_re
 from dropspin.comparisons.measuring.motion_quantities import Motions
 from dropspin.comparisons.measuring.state_quantities import States
 from dropspin.scenarios import Scenario, Trajectory, Truth
-from dropspin.scenarios.mechanics import apex
+from dropspin.scenarios.mechanics import angular_momentum, apex
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.rotations import cross, length
 from dropspin.scenarios.state import ORIENTATION, Array
@@ -263,7 +263,37 @@ class Comparison:
         """The vector from the centre of mass to the lowest point at a row [m], shape (3,); the mean if several points are equally low."""
         return self.scene.body.lowest(self.motion.orientation[row], 1e-6).mean(axis=0)
 
-    def normal_velocity_of_contact(self, row: int, contact_row: int) -> float:
-        """Vertical velocity [m/s] at one row of the point that is lowest at another row."""
-        arm = self.contact_point(contact_row)
-        return float((self.motion.velocity[row] + cross(self.motion.angular_velocity[row], arm))[1])
+    @cached_property
+    def struck_point(self) -> Array:
+        """The contact point at the last row before the first contact [m], shape (3,).
+
+        Raises:
+            Unresolved: There is no contact.
+        """
+        if self.first_contact is None:
+            raise Unresolved("no impact was detected")
+        return self.contact_point(self.first_contact[0])
+
+    def normal_velocity_of_struck_point(self, row: int) -> float:
+        """Vertical velocity of the point with this vector at a row [m/s]."""
+        return float((self.motion.velocity[row] + cross(self.motion.angular_velocity[row], self.struck_point))[1])
+
+    @cached_property
+    def moment_in_first_impact(self) -> Array:
+        """Change of angular momentum about the struck point in the first impact, relative to M r v, shape (3,).
+
+        The metric `contact_momentum_error` is its length.
+
+        Raises:
+            Unresolved: There is no contact, or it lasts to the end, or the body is at rest before it.
+        """
+        mass, r = self.scene.body.mass, self.struck_point
+        before, after = self.motions.first_contact
+        if after >= len(self.motion) - 1:
+            raise Unresolved("the contact lasts to the end")
+        turned = np.diff(angular_momentum(self.scene, self.motion[np.array([before, after])]), axis=0)[0]
+        pushed = self.motion.velocity[after] - self.motion.velocity[before] - (after - before) * self.dt * self.scene.acceleration
+        scale = mass * float(np.linalg.norm(r) * np.linalg.norm(self.motion.velocity[before]))
+        if scale == 0.0:
+            raise Unresolved("the body is at rest before the impact")
+        return (turned - cross(r, mass * pushed)) / scale

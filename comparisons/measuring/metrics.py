@@ -12,8 +12,8 @@ from dropspin.comparisons.measuring.comparison import SHORTEST_FLIGHT, Compariso
 from dropspin.comparisons.measuring.metric import Applies, Components, Measure, Metric
 from dropspin.comparisons.measuring.motion_quantities import Motions, at_rows
 from dropspin.scenarios import Scenario, Trajectory, Truth, truth_for
-from dropspin.scenarios.mechanics import angular_momentum, apex
-from dropspin.scenarios.rotations import angle_between_orientations, cross, length
+from dropspin.scenarios.mechanics import apex
+from dropspin.scenarios.rotations import angle_between_orientations, length
 from dropspin.scenarios.state import Array
 
 TURNED = 1e-3  # rad; a body that turns by less counts as not turning
@@ -105,38 +105,21 @@ def restitution_error(case: Comparison) -> float:
         raise Unresolved("the impact occurs in the last three time steps")
     if case.first_contact is None:
         return float("nan")  # there was no impact
-    before, after = case.first_contact
-    approach, separation = (case.normal_velocity_of_contact(row, contact_row=before) for row in (before, after))
+    approach, separation = map(case.normal_velocity_of_struck_point, case.first_contact)
     if not approach < 0.0:
         return float("nan")  # the change of velocity was not an impact
     expected = 0.0 if -approach < case.scene.floor.rest_speed else case.scene.floor.restitution
     return -separation / approach - expected
 
 
-def _moment_in_first_impact(case: Comparison) -> Array:
-    """Change of angular momentum about the contact point in the first impact, as in `contact_momentum_error`, shape (1, 3)."""
-    if case.first_contact is None:
-        raise Unresolved("no impact was detected")
-    before, after = case.first_contact
-    if after >= len(case.motion) - 1:
-        raise Unresolved("the contact lasts to the end")
-    mass, r = case.scene.body.mass, case.contact_point(before)
-    turned = np.diff(angular_momentum(case.scene, case.motion[np.array([before, after])]), axis=0)[0]
-    pushed = case.motion.velocity[after] - case.motion.velocity[before] - (after - before) * case.dt * case.scene.acceleration
-    scale = mass * float(np.linalg.norm(r) * np.linalg.norm(case.motion.velocity[before]))
-    if scale == 0.0:
-        raise Unresolved("the body is at rest before the impact")
-    return np.array([turned - cross(r, mass * pushed)]) / scale
-
-
-@_metric("1", "invariant", requirements.has_impact, components=_moment_in_first_impact, first_flight=True)
+@_metric("1", "invariant", requirements.has_impact, components=lambda case: case.moment_in_first_impact[np.newaxis], first_flight=True)
 def contact_momentum_error(case: Comparison) -> float:
     """Change of the angular momentum about the contact point in the first impact, relative to M r v.
 
     M is the mass, r the distance of the contact point from the centre of mass, and v the speed before the impact. The exact change is 0,
     because the impulse acts at the contact point. The effect of gravity is subtracted.
     """
-    return float(np.linalg.norm(_moment_in_first_impact(case)))
+    return float(np.linalg.norm(case.moment_in_first_impact))
 
 
 @_metric("1", "truth", requirements.comes_to_rest, signed=True)

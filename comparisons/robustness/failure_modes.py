@@ -161,8 +161,7 @@ def _between_rows(case: Comparison) -> float:
     """The error of restitution of an exact motion, whose velocities are recorded up to a step before and after an impact: g dt/u."""
     if case.first_contact is None:
         return 0.0
-    before, _ = case.first_contact
-    return float(case.motions.fall) / abs(case.normal_velocity_of_contact(before, contact_row=before))
+    return float(case.motions.fall) / abs(case.normal_velocity_of_struck_point(case.first_contact[0]))
 
 
 def _position_off(case: Comparison) -> Iterator[Diagnosis]:

@@ -139,8 +139,8 @@ def log_check(recording: Flights | Log | str | Path, on_progress: Callable[[str,
 def _in_another_reading(log: Log) -> tuple[Finding, Flights] | None:
     """The other reading in which the tosses fall longest, and its flights; None if less than half of the tosses fall in it."""
     readings = [(finding, read, falls(read, read.header.acceleration)) for finding, read in in_other_readings(log)]
-    finding, read, fallen = max(readings, key=lambda reading: sum(map(len, filter(None, reading[2]))))
-    flights = flights_of(read, read.header.acceleration) if 2 * fallen.count(None) <= len(fallen) else None
+    finding, read, fallen = max(readings, key=lambda reading: sum(map(len, reading[2])))
+    flights = flights_of(read, read.header.acceleration) if 2 * len(fallen) >= len(log.tosses) else None
     return None if flights is None else (finding, flights)
 
 
@@ -283,10 +283,8 @@ def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
         yield Value(f"slow noise of {name}", noise.slow, math.nan, math.nan, f"{unit}/s^1.5")
 
 
-def _tosses(flights: Flights) -> Iterator[TossFacts]:
-    weights = iter(flights.moving.weights)
-    for toss, flight in zip(flights.log.tosses, flights.flights, strict=True):
-        if flight is None:
-            yield TossFacts(toss.name, 0, 0, math.nan)
-        else:
-            yield TossFacts(toss.name, flight.first, len(flight), 1.0 / math.sqrt(next(weights)))
+def _tosses(flights: Flights) -> list[TossFacts]:
+    each = zip(flights.found, flights.moving.weights, strict=True)
+    facts = [TossFacts(flight.toss.name, flight.first, len(flight), 1.0 / math.sqrt(weight)) for flight, weight in each]
+    by_name = {one.name: one for one in facts}
+    return [by_name.get(toss.name, TossFacts(toss.name, 0, 0, math.nan)) for toss in flights.log.tosses]

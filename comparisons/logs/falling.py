@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from itertools import product
 
 import numpy as np
 
-from dropspin.comparisons.logs.flight import ACCELERATION, accelerations, is_near, noise_of, runs, standard_error, window_size
+from dropspin.comparisons.logs.flight import ACCELERATION, accelerations, falling_parts, noise_of, window_size
 from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, flights_of, heights
 from dropspin.comparisons.logs.header import LENGTHS, TIMES
 from dropspin.comparisons.logs.log import Log
@@ -58,25 +58,16 @@ def _acceleration(log: Log, down: Array) -> Array:
     The others are those of other units and axes, and those of pieces of the tosses.
     """
     noise, offset = noise_of(log), log.header.tracked_from_centre
-    tosses = log.tosses[:: math.ceil(len(log.tosses) / MOST_TOSSES)]
-
-    @cache
-    def pieces(number: int, size: int) -> Array:
-        return accelerations(tosses[number], size, offset)
+    tosses, pieces = log.tosses[:: math.ceil(len(log.tosses) / MOST_TOSSES)], cache(partial(accelerations, offset=offset))
 
     def falling(acceleration: Array) -> int:
-        """The frames of the longest run of each toss, together."""
-        total = 0
-        for number, toss in enumerate(tosses):
-            size = window_size(toss, noise, acceleration)
-            near = is_near(pieces(number, size), acceleration, standard_error(toss, size, noise))
-            total += max((end - first + size - 1 for first, end in runs(near)), default=0)
-        return total
+        """The frames of the longest part of each toss, together."""
+        return sum(max(map(len, falling_parts(toss, noise, acceleration, pieces)), default=0) for toss in tosses)
 
     lengths, times = ({a / b for a, b in product(units.values(), repeat=2)} for units in (LENGTHS, TIMES))
     factors = lengths | {ratio**2 for ratio in (*times, *RATES)}
     candidates = [factor * sign * np.roll(down, turn) for factor in sorted(factors) for turn in range(3) for sign in (1.0, -1.0)]
-    some = np.concatenate([pieces(number, size := window_size(toss, noise, down))[::size] for number, toss in enumerate(tosses)])
+    some = np.concatenate([pieces(toss, size := window_size(toss, noise, down))[::size] for toss in tosses])
     candidates += list(some[:: math.ceil(len(some) / MOST_PIECES) or 1])
     best = max(candidates, key=falling)
     return down if falling(down) > ABOUT * falling(best) else best

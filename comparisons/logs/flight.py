@@ -7,8 +7,9 @@ predicts it, within the noise that the recording itself shows.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -107,32 +108,26 @@ def _lines(t: Array) -> Array:
     return np.concatenate([np.broadcast_to(np.eye(3), (len(t), 3, 3)), t * np.eye(3)], axis=2)
 
 
-def falls(log: Log, acceleration: Array) -> list[Flight | None]:
-    """Of each toss the first long part whose pieces all have about an acceleration [m/s²], shape (3,); None without such a part.
+def falls(log: Log, acceleration: Array) -> list[Flight]:
+    """Of each toss the first long part, if any, whose pieces all have about an acceleration [m/s²], shape (3,).
 
     Long is more than half as long as the longest one: later parts are between impacts.
     """
-    noise, offset = noise_of(log), log.header.tracked_from_centre
-    return [_fall(toss, noise, offset, acceleration) for toss in log.tosses]
+    noise, pieces = noise_of(log), partial(accelerations, offset=log.header.tracked_from_centre)
+    parts = [falling_parts(toss, noise, acceleration, pieces) for toss in log.tosses]
+    return [next(part for part in of_toss if 2 * len(part) > max(map(len, of_toss))) for of_toss in parts if of_toss]
 
 
-def _fall(toss: Toss, noise: float, offset: Array, acceleration: Array) -> Flight | None:
+def falling_parts(toss: Toss, noise: float, acceleration: Array, pieces: Callable[[Toss, int], Array]) -> list[Flight]:
+    """The parts of a toss whose pieces all have about an acceleration [m/s²], shape (3,), with a noise of positions [m].
+
+    `pieces` gives the accelerations of all pieces of a toss that have some frames, shape (pieces, 3).
+    """
     size = window_size(toss, noise, acceleration)
-    near = is_near(accelerations(toss, size, offset), acceleration, standard_error(toss, size, noise))
-    parts = [Flight(toss, first, end + size - 1) for first, end in runs(near)]
-    longest = max(map(len, parts), default=0)
-    return next((part for part in parts if 2 * len(part) > longest), None)
-
-
-def runs(near: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """The first piece and the one after the last of each run of pieces that are near."""
+    farthest = max(NEAR * float(length(acceleration)), ERRORS * standard_error(toss, size, noise))
+    near = length(pieces(toss, size) - acceleration) < farthest
     edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
-    return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
-
-
-def is_near(pieces: Array, acceleration: Array, error: float) -> NDArray[np.bool_]:
-    """Whether accelerations of pieces are about a given one [m/s²], shapes (pieces, 3) and (3,), with their standard error."""
-    return length(pieces - acceleration) < max(NEAR * float(length(acceleration)), ERRORS * error)
+    return [Flight(toss, int(first), int(end) + size - 1) for first, end in edges.reshape(-1, 2)]
 
 
 def standard_error(toss: Toss, size: int, noise: float) -> float:

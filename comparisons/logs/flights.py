@@ -74,22 +74,20 @@ class Flights:
 
     Attributes:
         log: The recording.
-        flights: The flight of each toss, None where there is none.
         moving: Acceleration and d, with the noise of positions.
-        rotations: The rotor of each flight.
+        rotations: The rotor of each flight; some tosses may have no flight.
         turning: Ratios of inertia, with the noise of orientations [rad].
     """
 
     log: Log
-    flights: tuple[Flight | None, ...]
     moving: Regression
     rotations: tuple[Rotation, ...]
     turning: Regression
 
     @property
     def found(self) -> list[Flight]:
-        """The flights without those that are None."""
-        return [flight for flight in self.flights if flight is not None]
+        """The flights, at most one of each toss."""
+        return [rotor.flight for rotor in self.rotations]
 
     @cached_property
     def show_offset(self) -> NDArray[np.bool_]:
@@ -136,20 +134,14 @@ def flights_of(log: Log, acceleration: Array, report: Callable[[str, float], Non
     `report` is called with a description of the work and the fraction of it that is done.
     """
     flights = _above_floor(log.header, falls(log, acceleration))
+    if not flights:
+        return None
     for _ in range(2):
-        found = [flight for flight in flights if flight is not None]
-        if not found:
-            return None
-        moving = regression(list(map(positions, found)))
-        weights = iter(moving.weights)
-        flights = [None if flight is None else grown(flight, moving, next(weights)) for flight in flights]
-    inertia = log.header.body.inertia_tensor
-    rotors = iter([_sound(rotor) for rotor in _rotors([flight for flight in flights if flight is not None], inertia, report)])
-    by_toss = [None if flight is None else next(rotors) for flight in flights]
-    rotations = tuple(rotor for rotor in by_toss if rotor is not None)
+        moving = regression(list(map(positions, flights)))
+        flights = [grown(flight, moving, weight) for flight, weight in zip(flights, moving.weights, strict=True)]
+    rotations = tuple(map(_sound, _rotors(flights, log.header.body.inertia_tensor, report)))
     moving = regression([positions(rotor.flight) for rotor in rotations])
-    flown = tuple(None if rotor is None else rotor.flight for rotor in by_toss)
-    return Flights(log, flown, moving, rotations, _turning(rotations, report))
+    return Flights(log, moving, rotations, _turning(rotations, report))
 
 
 def _rotors(flights: Sequence[Flight], inertia: Array, report: Callable[[str, float], None], done: float = 0.0) -> Iterator[Rotation]:
@@ -180,12 +172,12 @@ def _turning(rotations: Sequence[Rotation], report: Callable[[str, float], None]
     return replace(turning, values=turning.values + moved)
 
 
-def _above_floor(header: Header, flights: list[Flight | None]) -> list[Flight | None]:
+def _above_floor(header: Header, flights: list[Flight]) -> list[Flight]:
     """The flights without those of bodies that stay on the floor or below it; all, if these are half: the floor is elsewhere then."""
     if header.floor is None:
         return flights
-    high = [None if flight is None else flight if highest(header, flight) > HIGH * header.body.size else None for flight in flights]
-    return high if 2 * high.count(None) < len(flights) + flights.count(None) else flights
+    high = [flight for flight in flights if highest(header, flight) > HIGH * header.body.size]
+    return high if 2 * len(high) > len(flights) else flights
 
 
 def highest(header: Header, flight: Flight) -> float:

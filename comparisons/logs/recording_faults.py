@@ -107,9 +107,9 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
         times_are_right = _residual(flights, equal_steps=False) <= BETTER * _residual(flights, equal_steps=True)
         irregularities = tuple(finding for finding in irregularities if finding.kind != "jitter" or not times_are_right)
     yield from irregularities
-    noise = noise_of(flights.log)
-    for toss, flight in zip(flights.log.tosses, flights.flights, strict=True):
-        if flight is None:
+    noise, flown = noise_of(flights.log), {flight.toss.name for flight in flights.found}
+    for toss in flights.log.tosses:
+        if toss.name not in flown:
             yield Finding("no flight", 0.0, window_size(toss, noise, flights.moving.values[ACCELERATION]), toss.name)
     for flight, weight in zip(flights.found, flights.moving.weights, strict=True):
         own = flights.moving.noise.of_weight(min(weight, 1.0))

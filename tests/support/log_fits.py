@@ -79,4 +79,4 @@ class KnownFlights(Flights):
 
 def recording(starts):
     moving, turning = (Regression(np.zeros(6), Noise(white, 0.0), *np.zeros((3, 1)), 1) for white in WHITE[[0, 3]])
-    return KnownFlights(Log(HEADER, tuple(start.toss for start in starts), "tosses", ()), (), moving, (), turning, starts)
+    return KnownFlights(Log(HEADER, tuple(start.toss for start in starts), "tosses", ()), moving, (), turning, starts)

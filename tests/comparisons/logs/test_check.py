@@ -376,8 +376,9 @@ def test_another_reading_is_not_searched_for_others(monkeypatch: pytest.MonkeyPa
 def rates_of(flights: Flights, **changes: Callable[[Toss], Any]) -> Iterator[Finding]:
     """The findings of rates in flights of tosses of which other parts are changed."""
     log = changed(flights.log, **changes)
-    moved = [flight and replace(flight, toss=toss) for flight, toss in zip(flights.flights, log.tosses, strict=True)]
-    return of_rates(replace(flights, log=log, flights=tuple(moved)))
+    each = zip(flights.rotations, log.tosses, strict=True)
+    moved = [replace(rotor, flight=replace(rotor.flight, toss=toss)) for rotor, toss in each]
+    return of_rates(replace(flights, log=log, rotations=tuple(moved)))
 
 
 @pytest.mark.parametrize("up", ["y", "z", "-x"])

@@ -61,13 +61,13 @@ def test_a_flight_ends_at_the_last_frame_but_one_before_the_impact() -> None:
 def test_a_toss_below_the_floor_has_no_flight_unless_half_of_them_are_below() -> None:
     log = made(6, 6, header={"floor": {"restitution": 0.3, "friction": 0.3}}).log
 
-    def flights_with(sunk: int, depth: float) -> list[bool]:
+    def flights_with(sunk: int, depth: float) -> list[int]:
         down = [depth * (number < sunk) for number in range(6)]
         tosses = [replace(toss, position=toss.position - [0.0, lower, 0.0]) for toss, lower in zip(log.tosses, down, strict=True)]
-        return [flight is not None for flight in found(replace(log, tosses=tuple(tosses))).flights]
+        return [int(flight.toss.name) for flight in found(replace(log, tosses=tuple(tosses))).found]
 
-    assert flights_with(2, 5.0) == [False, False, True, True, True, True]
-    assert flights_with(2, 0.0) == flights_with(3, 5.0) == [True] * 6
+    assert flights_with(2, 5.0) == [2, 3, 4, 5]
+    assert flights_with(2, 0.0) == flights_with(3, 5.0) == [0, 1, 2, 3, 4, 5]
 
 
 def test_the_noise_is_found() -> None:

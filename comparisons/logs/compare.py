@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, pairwise
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,9 +22,7 @@ from dropspin.comparisons.logs.continued_tosses import (
     of_each_engine,
     poses,
     recorded,
-    scene_of,
     time_step,
-    tracked,
     usable,
 )
 from dropspin.comparisons.logs.errors import KINDS, Kind, body_length, errors
@@ -40,7 +37,6 @@ from dropspin.comparisons.running.engine_entries import engine_entries
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.scenarios import Scenario
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.variations import with_values
 
@@ -121,16 +117,6 @@ class LogComparison:
     left_out: Mapping[str, str]
 
 
-class _Given(NamedTuple):
-    """What an engine continues: launches in a scene with a time step [s], and the header that says where the tracked point is."""
-
-    what: str
-    header: Header
-    scene: Scenario
-    launched: Launches
-    dt: float
-
-
 def log_compare(
     recording: Flights | Log | str | Path,
     engines: Engine | str | Iterable[Engine | str] = (),
@@ -162,7 +148,7 @@ def log_compare(
     starts = usable(flights)
     measured, dt = recorded(starts), time_step(starts)
     given = {entry.label: _given(flights, starts, dt, fit, entry.label) for entry in entries}
-    found, left_out = of_each_engine(entries, partial(_errors, given, measured), on_progress, resources, jobs)
+    found, left_out = of_each_engine(entries, partial(_errors, header, given, measured), on_progress, resources, jobs)
     pairs = [pair for kind in COMPARED for pair in _pairs(kind, found)]
     return LogComparison(
         len(starts),
@@ -181,31 +167,29 @@ def log_compare(
     )
 
 
-def _given(flights: Flights, starts: Sequence[Start], dt: float, fit: LogFit | None, label: str) -> list[_Given]:
+def _given(flights: Flights, starts: Sequence[Start], dt: float, fit: LogFit | None, label: str) -> dict[str, Launches]:
     """What an engine continues: as given, from drawn starts, and with one thing after another improved."""
-    header, scene = flights.log.header, scene_of(flights.log.header)
-    states, random = np.array([start.state for start in starts]), np.random.default_rng(SEED)
+    header, random = flights.log.header, np.random.default_rng(SEED)
+    found = {"as given": launches(header, starts, np.array([start.state for start in starts]), dt)}
     drawn = np.concatenate([start.drawn(random, DRAWS) for start in starts])
-    found = [
-        _Given("as given", header, scene, launches(scene, starts, states, dt), dt),
-        _Given("drawn starts", header, scene, launches(scene, [start for start in starts for _ in range(DRAWS)], drawn, dt), dt),
-    ]
+    found["drawn starts"] = launches(header, [start for start in starts for _ in range(DRAWS)], drawn, dt)
     centre = np.array(header.tracked_point) - flights.moving.values[OFFSET]
     keys = {"center_of_mass": tuple(centre.tolist()), "inertia": header.body.inertia_tensor.tolist()}
     header = header.model_copy(update={"body": type(header.body).model_validate(header.body.model_dump() | keys)})
-    scene, moved = scene_of(header), replace(flights, log=replace(flights.log, header=header))
+    moved = replace(flights, log=replace(flights.log, header=header))
     states = np.array([start.state for start in usable(moved)])
-    found.append(_Given("centre of mass", header, scene, launches(scene, starts, states, dt), dt))
+    found["centre of mass"] = improved = launches(header, starts, states, dt)
     fitted = {one.parameter: one.value for one in fit.estimates if one.engine == label} if fit is not None else {}
     if fitted:
-        scene = with_values(scene, "floor", **fitted)
-        found.append(_Given("friction and restitution", header, scene, launches(scene, starts, states, dt), dt))
-    found.append(_Given("time step", header, scene, launches(scene, starts, states, 0.5 * dt), 0.5 * dt))
+        improved = improved._replace(scene=with_values(improved.scene, "floor", **fitted))
+        found["friction and restitution"] = improved
+    found["time step"] = launches(header, starts, states, 0.5 * dt)._replace(scene=improved.scene)
     return found
 
 
 def _errors(
-    all_given: Mapping[str, Sequence[_Given]],
+    header: Header,
+    given: Mapping[str, Mapping[str, Launches]],
     measured: Array,
     entry: EngineEntry,
     processes: EngineProcesses,
@@ -213,22 +197,21 @@ def _errors(
 ) -> dict[str, Array] | Breakdown:
     """The errors of each toss by what was given, shape (m, kinds); those of drawn starts are differences from the motion as given."""
     found: dict[str, Array] = {}
-    nominal, given = measured, all_given[entry.label]
-    for one in given:
-        report(f"{entry.label}, {one.what}")
-        result = processes.call(entry, poses, [one.scene], one.launched, one.dt)
-        if isinstance(result, Breakdown):
-            if one.what == "as given":
-                return result
-            found[one.what] = np.full((len(measured), len(KINDS)), np.nan)
+    nominal = measured
+    for what, launched in given[entry.label].items():
+        report(f"{entry.label}, {what}")
+        seen = processes.call(entry, poses, launched)
+        if isinstance(seen, Breakdown):
+            if what == "as given":
+                return seen
+            found[what] = np.full((len(measured), len(KINDS)), np.nan)
             continue
-        seen, header = tracked(one.header, result[0]), given[0].header
-        t = one.launched.frames - one.launched.frames[:, :1]
-        reference = np.repeat(nominal, DRAWS, axis=0) if one.what == "drawn starts" else measured
-        of_each = errors(header.body, header.gravity, header.tracked_from_centre, t, reference, seen)
-        if one.what == "as given":
-            nominal = seen
-        found[one.what] = of_each.reshape(len(measured), -1, len(KINDS)).mean(axis=1)
+        t = launched.frames - launched.frames[:, :1]
+        reference = np.repeat(nominal, DRAWS, axis=0) if what == "drawn starts" else measured
+        of_each = errors(header.body, header.gravity, header.tracked_from_centre, t, reference, seen[0])
+        if what == "as given":
+            nominal = seen[0]
+        found[what] = of_each.reshape(len(measured), -1, len(KINDS)).mean(axis=1)
     return found
 
 

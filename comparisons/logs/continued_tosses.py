@@ -1,7 +1,7 @@
 """Tosses as engines continue them from the end of their flights, seen in the frames of the recording."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import NamedTuple, TypeVar
 
@@ -26,7 +26,7 @@ from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, SPIN, Array
 from dropspin.scenarios.text import counted
 from dropspin.scenarios.truths.flight import flight_states
 from dropspin.scenarios.validation import validated
-from dropspin.scenarios.variations import whole_steps
+from dropspin.scenarios.variations import whole_steps, with_values
 
 Result = TypeVar("Result")
 STEPS_PER_FRAME = 4
@@ -46,10 +46,16 @@ class Launches(NamedTuple):
     """Where engines take over.
 
     Attributes:
+        scene: The scene; its own start is of no toss.
+        dt: Time step [s].
+        point: The tracked point from the centre of mass, in the body frame [m], shape (3,).
         states: States of the centre of mass at the end of each flight, or earlier where noise has put the body below the floor, (m, 13).
         frames: Times of the frames to compare, from these states on [s], shape (m, n); NaN beyond the end of a toss.
     """
 
+    scene: Scenario
+    dt: float
+    point: Array
     states: Array
     frames: Array
 
@@ -135,19 +141,19 @@ def usable(flights: Flights, frames: int = 1) -> list[Start]:
     return starts
 
 
-def launches(scene: Scenario, starts: Sequence[Start], states: Array, dt: float, most: int | None = None) -> Launches:
+def launches(header: Header, starts: Sequence[Start], states: Array, dt: float, most: int | None = None) -> Launches:
     """Launches of tosses from states at the end of their flights, shape (m, 13), with the frames from there on, or at most so many.
 
     A state below the floor is replaced by that of an earlier time step of its flight.
 
     Raises:
-        DropspinError: The body is below the floor during all of a flight.
+        DropspinError: The header has no floor, or the body is below it during all of a flight.
     """
-    found, frames = states.copy(), []
+    scene, found, frames = scene_of(header), states.copy(), []
     for row, start in enumerate(starts):
         found[row : row + 1], earlier = _above_floor(scene, start, states[row : row + 1], dt)
         frames.append(_from(start, start.toss.t, most) - start.toss.t[start.frame] + earlier)
-    return Launches(found, _padded(frames))
+    return Launches(scene, dt, header.tracked_from_centre, found, _padded(frames))
 
 
 def _above_floor(scene: Scenario, start: Start, states: Array, dt: float) -> tuple[Array, float]:
@@ -180,22 +186,22 @@ def of_each_engine(
     return found, {label: result.reason for label, result in labelled.items() if isinstance(result, Breakdown)}
 
 
-def poses(entry: EngineEntry, scenes: Sequence[Scenario], launched: Launches, dt: float) -> Array:
-    """An engine's motions in the frames, shape (scenes, tosses, frames, 7): centre of mass and orientation; runs in the engine's process.
+def poses(entry: EngineEntry, launched: Launches, floors: Sequence[Mapping[str, float]] = ({},)) -> Array:
+    """The poses of the tracked point in the frames, shape (floors, tosses, frames, 7), by an engine; runs in the engine's process.
 
     Frames beyond the end of a toss are NaN. An engine whose velocities lag its positions starts with those of so much earlier, so that its
     flight is the recorded one.
 
     Args:
         entry: The engine.
-        scenes: The scenes; their own starts are of no toss.
         launched: The launches.
-        dt: Time step [s].
+        floors: Values of the floor that differ from those of the scene.
 
     Raises:
-        Breakdown: The engine declines a scene.
+        Breakdown: The engine declines a floor.
         Diverged: A motion is not finite.
     """
+    dt, scenes = launched.dt, [with_values(launched.scene, "floor", **values) for values in floors]
     for scene in scenes:
         verify_accepted(entry.adapter, scene)
     states, steps = launched.states.copy(), launched.frames / dt
@@ -212,6 +218,7 @@ def poses(entry: EngineEntry, scenes: Sequence[Scenario], launched: Launches, dt
             found[number, rows] = _at(np.stack([recording.motion.states[:, : ORIENTATION.stop] for recording in recordings]), steps[rows])
     if not np.isfinite(found[:, np.isfinite(steps)]).all():
         raise Diverged("a toss is not finite")
+    found[..., POSITION] += rotate(found[..., ORIENTATION], launched.point)
     return found
 
 
@@ -230,13 +237,6 @@ def _at(motions: Array, steps: Array) -> Array:
     found = (1.0 - share) * motions[row, before] + share * motions[row, before + 1]
     found[..., ORIENTATION] /= length(found[..., ORIENTATION])[..., np.newaxis]
     return found
-
-
-def tracked(header: Header, found: Array) -> Array:
-    """Poses of the tracked point from those of the centre of mass, shape (..., 7)."""
-    moved = found.copy()
-    moved[..., POSITION] += rotate(found[..., ORIENTATION], header.tracked_from_centre)
-    return moved
 
 
 def recorded(starts: Sequence[Start], most: int | None = None) -> Array:

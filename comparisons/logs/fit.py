@@ -156,7 +156,7 @@ def log_fit(
         if parameter == "friction" and len(bounded) > 1:
             friction = _of_all(parameter, bounded, size)
     discrepancies = {label: profile.discrepancy for label, (profile, _) in fitted.items()}
-    return LogFit(size, frames, tuple(estimates), tuple(transfers), friction, discrepancies, left_out, _touches(problems[0]))
+    return LogFit(size, frames, tuple(estimates), tuple(transfers), friction, discrepancies, left_out, _touches(flights, problems[0]))
 
 
 def _profile(
@@ -189,10 +189,10 @@ def _without_step(coarser: Profile, finer: Profile) -> Extrapolated:
     return found, REMAINDER * (finer.value - coarser.value)
 
 
-def _touches(problem: Problem) -> bool:
+def _touches(flights: Flights, problem: Problem) -> bool:
     """Whether a body is near the floor of the header in any of the frames."""
-    poses = problem.measured.reshape(-1, 7)
-    return bool(heights(problem.header, poses[:, POSITION], poses[:, ORIENTATION]).min() < NEAR_FLOOR * problem.header.body.size)
+    header, poses = flights.log.header, problem.measured.reshape(-1, 7)
+    return bool(heights(header, poses[:, POSITION], poses[:, ORIENTATION]).min() < NEAR_FLOOR * header.body.size)
 
 
 def _estimate(label: str, parameter: str, found: Extrapolated, size: int) -> Estimate:

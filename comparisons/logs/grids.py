@@ -15,17 +15,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropspin.comparisons.logs.continued_tosses import Launches, launches, poses, recorded, scene_of, time_step, tracked, usable
+from dropspin.comparisons.logs.continued_tosses import Launches, launches, poses, recorded, time_step, usable
 from dropspin.comparisons.logs.flights import Flights
-from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.intervals import resamples
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import rotation_vector
 from dropspin.scenarios.state import ORIENTATION, POSITION, Array
-from dropspin.scenarios.variations import with_values
 
 FIRST_GRID = {"friction": np.linspace(0.0, 1.0, 7) ** 1.5, "restitution": np.linspace(0.0, 1.0, 7)}
 GRID, FINER = 7, 8
@@ -52,12 +49,9 @@ TIE = 1e-3
 class Problem(NamedTuple):
     """What all engines are given: the tosses, and those from starts that differ by a standard deviation in each of 12 directions."""
 
-    scene: Scenario
-    dt: float
     measured: Array
     launched: Launches
     perturbed: Launches
-    header: Header
     variances: Array
 
 
@@ -85,12 +79,11 @@ class Profile(NamedTuple):
 def problem_of(flights: Flights, frames: int, steps: int) -> Problem:
     """What all engines are given, with a number of time steps in a frame."""
     header, starts = flights.log.header, usable(flights, frames)
-    scene, dt = scene_of(header), time_step(starts, steps)
-    launched = launches(scene, starts, np.array([start.state for start in starts]), dt, frames)
-    moved = np.concatenate([start.moved(start.deviations) for start in starts])
-    perturbed = launches(scene, [start for start in starts for _ in range(12)], moved, dt, frames)
+    dt, moved = time_step(starts, steps), np.concatenate([start.moved(start.deviations) for start in starts])
+    launched = launches(header, starts, np.array([start.state for start in starts]), dt, frames)
+    perturbed = launches(header, [start for start in starts for _ in range(12)], moved, dt, frames)
     noise = np.repeat([flights.moving.noise.white, header.body.size * flights.turning.noise.white], 3)
-    return Problem(scene, dt, recorded(starts, frames)[:, 1:], launched, perturbed, header, np.tile(noise**2, frames))
+    return Problem(recorded(starts, frames)[:, 1:], launched, perturbed, np.tile(noise**2, frames))
 
 
 def profile_of(problem: Problem, entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> Profile | Breakdown:
@@ -98,16 +91,16 @@ def profile_of(problem: Problem, entry: EngineEntry, processes: EngineProcesses,
     axes, counts = tuple(FIRST_GRID.values()), resamples(len(problem.measured))
     for number in range(1, MOST_GRIDS + 1):
         report(f"{entry.label}, grid {number}")
-        scenes = [with_values(problem.scene, "floor", friction=f, restitution=e) for f in axes[0].tolist() for e in axes[1].tolist()]
-        found = processes.call(entry, poses, scenes, problem.launched, problem.dt)
+        floors = [{"friction": f, "restitution": e} for f in axes[0].tolist() for e in axes[1].tolist()]
+        found = processes.call(entry, poses, problem.launched, floors)
         if isinstance(found, Breakdown):
             return found
         residuals = _differences(problem, problem.measured, found)
         best = int(np.argmin(np.median(np.mean(residuals**2, axis=2), axis=1)))
-        around = processes.call(entry, poses, [scenes[best]], problem.perturbed, problem.dt)
+        around = processes.call(entry, poses, problem.perturbed, [floors[best]])
         if isinstance(around, Breakdown):
             return around
-        nominal = tracked(problem.header, found[best])[:, 1:]
+        nominal = found[best, :, 1:]
         derivatives = _differences(problem, np.repeat(nominal, 12, axis=0), around)[0].reshape(*nominal.shape[:1], 12, -1)
         losses, discrepancy = _losses(residuals, derivatives, problem.variances, axes)
         profile = Profile(*_best(losses, axes, counts), discrepancy)
@@ -121,8 +114,8 @@ def profile_of(problem: Problem, entry: EngineEntry, processes: EngineProcesses,
 
 def _differences(problem: Problem, reference: Array, found: Array) -> Array:
     """Poses minus those of a reference, shape (m, frames, 7), without the first frame, in metres, shape (scenes, m, 6 frames)."""
-    seen = tracked(problem.header, found)[:, :, 1:]
-    turned = problem.header.body.size * rotation_vector(reference[..., ORIENTATION], seen[..., ORIENTATION])
+    seen = found[:, :, 1:]
+    turned = problem.launched.scene.body.size * rotation_vector(reference[..., ORIENTATION], seen[..., ORIENTATION])
     return np.concatenate([seen[..., POSITION] - reference[..., POSITION], turned], axis=-1).reshape(*seen.shape[:2], -1)
 
 

@@ -12,7 +12,6 @@ from dropspin.comparisons.logs.noise import Noise, Regression
 from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.scenarios.rotations import multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-from dropspin.scenarios.variations import with_values
 
 WANG = "wang[contact=sequential,law=coulomb]"
 RATE, FLIGHT, FRAMES = 148.0, 30, 8
@@ -52,9 +51,9 @@ def true_states(random, count, height=0.0):
 
 def tosses(random, count, engine, friction, restitution, frames=FRAMES, height=0.0, dt=1.0 / RATE / STEPS_PER_FRAME):
     """Flights of tosses that an engine makes, with noise in the frames after the flight and errors in the states at its end."""
-    states, scene = true_states(random, count, height), with_values(scene_of(HEADER), "floor", friction=friction, restitution=restitution)
-    t = np.arange(frames + 1) / RATE
-    [motions] = poses(engine_entry(engine), [scene], Launches(states, np.tile(t, (count, 1))), dt)
+    states, t = true_states(random, count, height), np.arange(frames + 1) / RATE
+    launched = Launches(scene_of(HEADER), dt, np.zeros(3), states, np.tile(t, (count, 1)))
+    [motions] = poses(engine_entry(engine), launched, [{"friction": friction, "restitution": restitution}])
     noise = random.normal(size=(count, frames + 1, 6)) * WHITE
     positions = motions[..., POSITION] + noise[..., :3]
     orientations = multiply(quaternions(noise[..., 3:]), motions[..., ORIENTATION])

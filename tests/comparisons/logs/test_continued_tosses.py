@@ -22,7 +22,7 @@ def test_flight_of_an_engine_is_the_exact_one_in_every_frame(name):
     state = log_fits.true_states(np.random.default_rng(1), 1)[0]
     state[1] += 2.0
     scene, frames = scene_of(log_fits.HEADER), np.arange(20) / log_fits.RATE
-    found = poses(engine_entry(name), [scene], Launches(state[np.newaxis], frames[np.newaxis]), DT)[0, 0]
+    found = poses(engine_entry(name), Launches(scene, DT, np.zeros(3), state[np.newaxis], frames[np.newaxis]))[0, 0]
     exact = flight_states(state, scene.body.inertia_tensor, scene.acceleration)(frames)
     assert np.abs(found[:, POSITION] - exact[:, POSITION]).max() < 1e-12
     assert angle_between_orientations(found[:, ORIENTATION], exact[:, ORIENTATION]).max() < 2e-4  # of the first order, 1.5e-5 measured
@@ -35,9 +35,9 @@ def test_state_that_noise_puts_below_the_floor_starts_earlier():
     depth = scene.starting_at(states[0]).clearance + 1e-4
     states[0, 1] -= depth
     with pytest.raises(DropspinError, match=r"toss 0: the body is 0\.1 mm below the floor"):
-        launches(scene, starts, states, DT)
+        launches(log_fits.HEADER, starts, states, DT)
     starts[0] = replace(starts[0], frame=1, toss=replace(starts[0].toss, t=np.arange(10) / log_fits.RATE))
-    found = launches(scene, starts, states, DT)
+    found = launches(log_fits.HEADER, starts, states, DT)
     assert found.frames[0, 0] == pytest.approx(DT)
     assert scene.starting_at(found.states[0]).clearance > 0.0
 

@@ -181,7 +181,8 @@ def test_grid_around_estimates_at_the_end_of_the_first_grid_has_all_of_its_value
 
 @pytest.mark.parametrize(("height", "touches"), [(0.0, True), (0.3, False)])
 def test_frames_in_which_no_body_is_near_the_floor_are_known(height, touches):
-    assert log_fits._touches(problem_of(tosses(np.random.default_rng(4), 8, WANG, 0.3, 0.3, height=height, dt=FINE), 8, 4)) is touches
+    flights = tosses(np.random.default_rng(4), 8, WANG, 0.3, 0.3, height=height, dt=FINE)
+    assert log_fits._touches(flights, problem_of(flights, 8, 4)) is touches
 
 
 @pytest.mark.extended

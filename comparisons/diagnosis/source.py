@@ -110,9 +110,15 @@ def _read(path: Path, home: Path, within: tuple[Path, ...], count: list[int]) ->
             raise DropspinError(f"{path}: has more than {MOST_ELEMENTS:,} elements; give a smaller model.")
         if tag.startswith("xacro:"):
             raise DropspinError(f"{path}: line {parser.CurrentLineNumber}: has macros; expand them first, with: xacro {path.name}")
-        element = Element(tag, attributes, path.name, parser.CurrentLineNumber, stack[-1])
-        stack[-1].children.append(element)
-        stack.append(element)
+        parent, found = stack[-1], [Element(tag, attributes, path.name, parser.CurrentLineNumber, stack[-1])]
+        stack.extend(found)
+        if tag == "include" and parent.tag:
+            places = [place / attributes.get("file", "") for place in (home, path.parent)]
+            there = next((place for place in places if place.is_file()), places[0])
+            found = _read(there, home, (*within, path.resolve()), count).children
+        parent.children += found
+        for child in found:
+            child.parent = parent
 
     def refuse(*declaration: object) -> None:
         raise DropspinError(f"{path}: line {parser.CurrentLineNumber} declares a document type or entities, which models do not need.")
@@ -125,13 +131,4 @@ def _read(path: Path, home: Path, within: tuple[Path, ...], count: list[int]) ->
         raise DropspinError(f"{path}: not XML: {error}.") from None
     [root] = stack[0].children
     root.parent = None
-    for include in list(root.every("include")):
-        parent, given = include.parent, include.attributes.get("file", "")
-        assert parent is not None
-        there = next((place / given for place in (home, path.parent) if (place / given).is_file()), home / given)
-        included = _read(there, home, (*within, path.resolve()), count).children
-        place = parent.children.index(include)
-        parent.children[place : place + 1] = included
-        for child in included:
-            child.parent = parent
     return root

@@ -20,6 +20,7 @@ LEAST_NOISE = 1e-6  # of a ratio of speeds
 LONGEST_WATCHED = 3.0  # s, for an impact on a soft surface
 STILL = 0.01
 """Share of the speed of an impact at which a body that has not left the surface rests on it."""
+THROUGH = "passes through"
 OF_CONTACT = ("solref", "solimp", "stiffness")
 """Settings of contacts that a file may have, beside restitution and friction."""
 
@@ -32,8 +33,7 @@ class Impacts(NamedTuple):
         upward: Largest upward speed of the centre of mass over impact speed.
         depths: Largest depth [m].
         times: Time in contact [s]; infinite if the body does not leave the surface.
-        failure: Why values are NaN, for a table; empty if they are not.
-        passes_through: Whether it is that the body passes through the surface.
+        failure: Why values are NaN, such as `THROUGH`; empty if they are not.
     """
 
     ratios: Array
@@ -41,7 +41,6 @@ class Impacts(NamedTuple):
     depths: Array
     times: Array
     failure: str = ""
-    passes_through: bool = False
 
 
 def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
@@ -68,9 +67,8 @@ def rebound(body: LooseBody, dts: Sequence[float], speed: float, quantity: str) 
     found = [_impacts(body, speed, dt, FEWER if number else PHASES) for number, dt in enumerate(dts)]
     exact = math.nan if body.facts.restitution is None else body.facts.restitution
     answer = Answer("impact", quantity, "1", speed=speed, in_force=exact, detail=found[0].failure)
-    kind: Kind
-    if found[0].passes_through:
-        kind = "setting" if found[-1].passes_through else "time step"
+    if found[0].failure == THROUGH:
+        kind: Kind = "setting" if found[-1].failure == THROUGH else "time step"
         why = "because the body passes through the surface, which harder contacts or smaller time steps prevent"
         return replace(answer, detail="none", findings=(Finding(kind, ("timestep",), detail=why),))
     if found[0].failure:
@@ -111,8 +109,7 @@ def _impacts(body: LooseBody, speed: float, dt: float, phases: int) -> Impacts:
             return Impacts(*found.T)
     is_through = any(of_states[-1] < -2.0 * size for of_states in heights)
     unknown = np.full(phases, math.nan)
-    failure = "passes through" if is_through else f"contact > {LONGEST_WATCHED:g} s"
-    return Impacts(unknown, unknown, unknown, unknown, failure, is_through)
+    return Impacts(unknown, unknown, unknown, unknown, THROUGH if is_through else f"contact > {LONGEST_WATCHED:g} s")
 
 
 def _impact(states: Array, heights: Array, gap: float, dt: float, speed: float, g: float) -> tuple[float, float, float, float]:

@@ -21,14 +21,9 @@ def contact_of(model: Any, first: int, second: int) -> dict[str, Any] | None:
     if not (types[first] & affinities[second] or types[second] & affinities[first]) or np.isin(model.exclude_signature, excluded).any():
         return None
     both = mixed(_settings_of(model, first), _settings_of(model, second))
-    return {
-        "condim": both.condim,
-        "solref": np.array(both.solref),
-        "solimp": np.array(both.solimp),
-        "friction": np.array(both.friction)[[0, 0, 1, 2, 2]],
-        "margin": both.margin,
-        "gap": model.geom_gap[[first, second]].sum(),
-    } | overrides(model)
+    settings = {name: np.array(getattr(both, name)) for name in ("solref", "solimp", "margin", "friction")}
+    settings |= {"friction": settings["friction"][[0, 0, 1, 2, 2]], "gap": model.geom_gap[[first, second]].sum()}
+    return {"condim": both.condim} | settings | overrides(model)
 
 
 def friction_of(contact: dict[str, Any]) -> tuple[float, float]:

@@ -61,8 +61,8 @@ class MuJoCoAlone:
         for geom in self.geoms:
             if old.geom_type[geom] not in MODELLED:
                 raise Breakdown("declined", f"its geometry {self.names[geom]!r} is a {kind_of(old, geom)}, which is not modelled")
-        self.surface = file.surface(on, self.geoms)
-        self.others = file.surfaces(self.geoms)[1:] if on is None else []
+        surfaces = file.surfaces(on, self.geoms)
+        self.surface, self.others = next(iter(surfaces), None), surfaces[1:]
         self.missed = file.missed(self.geoms)
         self.left_out = file.left_out(self.geoms) if on is None else ""
         self.pairs: dict[int, dict[str, Any]] = {}

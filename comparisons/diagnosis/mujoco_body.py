@@ -91,8 +91,7 @@ class MuJoCoBody(LooseBody):
         self._offset = found.centre
         self._pose = multiply(alone.level, np.roll(alone.file.data.xquat[alone.head], -1))
         self._touching = {geom: alone.in_force_of(geom) for geom in self._lowest}
-        every = self._touching | {geom: alone.in_force_of(geom) for geom in alone.pairs if geom not in self._touching}
-        self._text = BodyText(alone.file, alone.head, alone.surface, tuple(self._touching), every)
+        self._text = BodyText(alone, self._touching)
         self.facts = self._facts()
         contact, sleep = self.facts.in_file(*DEFAULT_CONTACT), ("sleep_tolerance",) * sleeps(self._model.opt)
         of_contact = {"slide": contact, "roll": contact}

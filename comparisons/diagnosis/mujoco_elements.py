@@ -1,5 +1,7 @@
 """The elements of an MJCF or URDF file that the bodies, geometries and contact pairs of the compiled model come from."""
 
+from collections.abc import Sequence
+
 import mujoco
 
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile
@@ -9,24 +11,24 @@ from dropspin.comparisons.diagnosis.source import Element
 def body_element(file: MuJoCoFile, number: int) -> Element | None:
     """A body in the file: by its name, or by its place if the file has as many bodies as the model."""
     bodies = list(file.source.every("link" if file.is_urdf else "body"))
-    name = mujoco.mj_id2name(file.model, BODY, number)
-    named = [element for element in bodies if name and element.attributes.get("name") == name]
-    if not named and len(bodies) == file.model.nbody - 1:
-        named = bodies[number - 1 : number]
-    return named[0] if named else None
+    placed = bodies[number - 1] if len(bodies) == file.model.nbody - 1 else None
+    return _named(bodies, mujoco.mj_id2name(file.model, BODY, number), placed)
 
 
 def geom_element(file: MuJoCoFile, number: int) -> Element | None:
     """A geometry in the file: by its name, or by its place if its body has as many geometries in the file as in the model."""
-    every, name, body = list(file.source.every("geom")), mujoco.mj_id2name(file.model, GEOM, number), int(file.model.geom_bodyid[number])
-    named = [geom for geom in every if name and geom.attributes.get("name") == name]
+    every, body = list(file.source.every("geom")), int(file.model.geom_bodyid[number])
     owner = body_element(file, body) if body else None
     owners = [(geom, owner_of(geom)) for geom in every]
     of_body = [geom for geom, one in owners if one is not None and (one is owner if body else one.tag == "worldbody")]
-    if not named and len(of_body) == file.model.body_geomnum[body] - (body == 0):  # without the plane that is added to the world
-        place = number - int(file.model.body_geomadr[body])
-        named = of_body[place : place + 1]
-    return named[0] if named else None
+    place, added = number - int(file.model.body_geomadr[body]), body == 0  # the plane that is added to the world, its last geometry
+    placed = of_body[place] if place < len(of_body) == file.model.body_geomnum[body] - added else None
+    return _named(every, mujoco.mj_id2name(file.model, GEOM, number), placed)
+
+
+def _named(elements: Sequence[Element], name: str | None, placed: Element | None) -> Element | None:
+    """The first of some elements that has a name, or else the one in its place."""
+    return next((element for element in elements if name and element.attributes.get("name") == name), placed)
 
 
 def pair_element(file: MuJoCoFile, *geoms: int) -> Element | None:

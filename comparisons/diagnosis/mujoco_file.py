@@ -14,7 +14,7 @@ from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mjcf_defaults import option_setting
 from dropspin.comparisons.diagnosis.mujoco_compiled import placed
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of
-from dropspin.comparisons.diagnosis.mujoco_recompiled import LEAST, Recompiled
+from dropspin.comparisons.diagnosis.mujoco_recompiled import LEAST
 from dropspin.comparisons.diagnosis.mujoco_shapes import ALONG, distance_to, kind_of
 from dropspin.comparisons.diagnosis.source import read_source
 from dropspin.comparisons.diagnosis.urdf_file import package_remedy, verify_one_root
@@ -71,7 +71,6 @@ class MuJoCoFile:
             raise DropspinError(f"{given}: {written}: a time step must be above 0 and at most {LONGEST_STEP:g} s.")
         self.compiled = placed(self.model)
         self.data = self.compiled[1]
-        self.recompiled = Recompiled(self._spec)
         flags, bit = self.model.opt.disableflags, mujoco.mjtDisableBit
         self.gravity = np.zeros(3) if flags & bit.mjDSBL_GRAVITY else np.array(self.model.opt.gravity)
         self.has_contacts = not flags & (bit.mjDSBL_CONTACT | bit.mjDSBL_CONSTRAINT)
@@ -79,17 +78,17 @@ class MuJoCoFile:
 
     def _compiled(self, path: Path) -> Any:
         """The model, with an additional plane; an impossible inertia is balanced, and `refusal` has MuJoCo's reason."""
-        self._spec = mujoco.MjSpec.from_file(str(path))
+        self.spec = mujoco.MjSpec.from_file(str(path))
         if self.is_urdf:  # the root link would become a part of the world
-            self._spec.compiler.fusestatic = False
-        self._spec.worldbody.add_geom(name=ADDED, type=PLANE, size=[0.0, 0.0, 1.0])
+            self.spec.compiler.fusestatic = False
+        self.spec.worldbody.add_geom(name=ADDED, type=PLANE, size=[0.0, 0.0, 1.0])
         try:
-            return self._spec.compile()
+            return self.spec.compile()
         except ValueError as error:
             if "balanceinertia" not in str(error):
                 raise
-            self.refusal, self._spec.compiler.balanceinertia = one_line(error), True
-            return self._spec.compile()
+            self.refusal, self.spec.compiler.balanceinertia = one_line(error), True
+            return self.spec.compile()
 
     def names(self, kind: Any) -> dict[str, int]:
         """The numbers of bodies or geometries by name; one without a name is called by its kind and number."""
@@ -126,7 +125,7 @@ class MuJoCoFile:
 
     def runs(self, dt: float, changes: Changes) -> bool:
         """Whether the whole model runs for a tenth of a second with other options."""
-        spec = self._spec.copy()
+        spec = self.spec.copy()
         set_options(spec.option, self.model.opt, dt, changes)
         model = spec.compile()
         data = mujoco.MjData(model)
@@ -174,12 +173,22 @@ class MuJoCoFile:
             found += [f"the pose of keyframe {', '.join(names[:MOST_LISTED])}{' and others' * (len(names) > MOST_LISTED)}"] * bool(names)
         return found
 
-    def surfaces(self, own: Sequence[int]) -> list[int]:
-        """The planes and boxes of the world that some geometries collide with: those below them by height, then the other ones.
+    def surfaces(self, wanted: str | None, own: Sequence[int]) -> list[int]:
+        """The geometry of a name that some geometries land on; or what they may land on, the best first.
 
-        Of these, planes that gravity does not lead away from come before boxes, and boxes before other planes. A plane that is added if
-        there is none, or if none of them is below, and something of another kind may be.
+        That is the planes and boxes of the world that they collide with: those below them by height, then the other ones. Of these, planes
+        that gravity does not lead away from come before boxes, and boxes before other planes. A plane that is added if there is none, or if
+        none of them is below, and something of another kind may be.
+
+        Raises:
+            DropspinError: There is no geometry of this name, or it is neither a plane nor a box.
         """
+        if wanted is not None:
+            others = {name: geom for name, geom in self.names(GEOM).items() if geom not in own}
+            verify_known("the model's geometry", [wanted], others)
+            if self.model.geom_type[others[wanted]] not in SURFACES:
+                raise DropspinError(f"--on {wanted}: is neither a plane nor a box; name one of these.")
+            return [others[wanted]]
         added = self.names(GEOM)[ADDED]
         found = [geom for geom in self._still(own) if self.model.geom_type[geom] in SURFACES and self._collide(own, geom)]
 
@@ -233,20 +242,6 @@ class MuJoCoFile:
 
     def _collide(self, own: Sequence[int], other: int) -> bool:
         return any(contact_of(self.model, one, other) for one in own)
-
-    def surface(self, wanted: str | None, own: Sequence[int]) -> int | None:
-        """The geometry that some geometries land on: the one named, or the first of those that they may land on.
-
-        Raises:
-            DropspinError: There is no such geometry, or it is neither a plane nor a box.
-        """
-        if wanted is None:
-            return next(iter(self.surfaces(own)), None)
-        others = {name: geom for name, geom in self.names(GEOM).items() if geom not in own}
-        verify_known("the model's geometry", [wanted], others)
-        if self.model.geom_type[others[wanted]] not in SURFACES:
-            raise DropspinError(f"--on {wanted}: is neither a plane nor a box; name one of these.")
-        return others[wanted]
 
 
 def set_options(option: Any, compiled: Any, dt: float, changes: Changes) -> None:

@@ -13,7 +13,7 @@ from dropspin.comparisons.diagnosis.loose_body import MassProperties
 from dropspin.comparisons.diagnosis.mjcf_defaults import option_setting
 from dropspin.comparisons.diagnosis.mujoco_elements import children_of
 from dropspin.comparisons.diagnosis.mujoco_file import BODY
-from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL
+from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, with_exact_volumes, without, without_visual
 from dropspin.comparisons.diagnosis.mujoco_shapes import mesh_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText, differ
 from dropspin.comparisons.diagnosis.source import Ignored, Setting
@@ -93,7 +93,7 @@ def _meshes(text: BodyText) -> Iterator[Ignored]:
         if not is_whole(points, faces):
             made = "but mass and inertia are those of the first object of its file"
             yield "mesh", words(name), f"read in part: all of its {len(points)} vertices collide, {made}"
-    has, exact = text.properties(text.file.compiled), text.properties(text.file.recompiled.exact)
+    has, exact = text.properties(text.file.compiled), text.properties(with_exact_volumes(text.file.spec))
     if has is not None and exact is not None and abs(has.mass - exact.mass) > NOTEWORTHY * exact.mass:
         made = f'counted as {has.mass:.4g} kg by default; its volume has {exact.mass:.4g} kg, which inertia="exact" gives'
         yield "mesh", words(*names.values()), made
@@ -115,7 +115,7 @@ def _of_links(text: BodyText) -> Iterator[Ignored]:
 
 def _visual(text: BodyText) -> Iterator[Ignored]:
     """Geometries that collide with nothing, and count in the mass by their density."""
-    has, least = text.properties(text.file.compiled), text.properties(text.file.recompiled.without_visual)
+    has, least = text.properties(text.file.compiled), text.properties(without_visual(text.file.spec))
     if text.element is None or has is None or least is None or not has.mass - least.mass > NOTEWORTHY * has.mass:
         return
     model, elements = text.model, children_of(text.element, "geom")
@@ -139,9 +139,9 @@ def _changed(text: BodyText, name: str, made: str) -> Ignored:
 def _effect(text: BodyText, setting: str, name: str) -> float:
     """By how much a setting of the compiler alone changes a quantity, in its unit; 0 for rounding."""
     if setting == "balanceinertia":
-        without, has = text.written, text.unchanged
+        neutral, has = text.written, text.unchanged
     else:
-        without, has = (text.properties(one) for one in (text.file.recompiled.without(setting), text.file.compiled))
-    if without is None or has is None or not differ(getattr(without, name), getattr(has, name)):
+        neutral, has = (text.properties(one) for one in (without(text.file.spec, setting), text.file.compiled))
+    if neutral is None or has is None or not differ(getattr(neutral, name), getattr(has, name)):
         return 0.0
-    return float(np.abs(np.subtract(getattr(without, name), getattr(has, name))).max())
+    return float(np.abs(np.subtract(getattr(neutral, name), getattr(has, name))).max())

@@ -1,9 +1,12 @@
-"""A model file as MuJoCo compiles it without some of what changes masses and inertias."""
+"""A specification as MuJoCo compiles it without some of what changes masses and inertias.
+
+Functions from a specification, which they do not change, to the model with its data; None if MuJoCo refuses it.
+"""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
-from functools import cache, cached_property
+from functools import lru_cache
 from typing import Any
 
 import mujoco
@@ -20,55 +23,46 @@ NEUTRAL: Mapping[str, Any] = {
     "inertiafromgeom": mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO,
 }
 """Settings of the compiler that change masses and possible inertias of a file, with the values at which they change none."""
+CHANGED = 8
+"""Models of a file that are kept: without each setting, and without all."""
 
 
-class Recompiled:
-    """The models, with their data, that follow from a specification by changes; None if MuJoCo refuses one.
+@lru_cache(CHANGED)
+def without(spec: Any, *settings: str) -> tuple[Any, Any] | None:
+    """The model without the effect of some settings of the compiler; impossible inertias are balanced."""
+    spec = spec.copy()
+    spec.compiler.balanceinertia = True
+    for name in settings:
+        setattr(spec.compiler, name, NEUTRAL[name])
+    return _compiled(spec)
 
-    Args:
-        spec: The specification; it is not changed.
+
+@lru_cache(1)
+def with_exact_volumes(spec: Any) -> tuple[Any, Any] | None:
+    """With exact volumes of meshes, of which MuJoCo counts parts twice by default.
+
+    None without such meshes, or if MuJoCo refuses one: its surface is open, or inside out.
     """
+    spec = spec.copy()
+    counted = [mesh for mesh in spec.meshes if mesh.inertia == mujoco.mjtMeshInertia.mjMESH_INERTIA_LEGACY]
+    for mesh in counted:
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT
+    return _compiled(spec) if counted else None
 
-    def __init__(self, spec: Any) -> None:
-        self._spec = spec
 
-    @cached_property
-    def without(self) -> Callable[..., tuple[Any, Any] | None]:
-        """The function from settings of the compiler to the model without their effect, made once; impossible inertias are balanced."""
-        return cache(self._without)
+@lru_cache(1)
+def without_visual(spec: Any) -> tuple[Any, Any] | None:
+    """Without mass of geometries that collide with nothing, and of which the file gives no mass.
 
-    def _without(self, *settings: str) -> tuple[Any, Any] | None:
-        spec = self._spec.copy()
-        spec.compiler.balanceinertia = True
-        for name in settings:
-            setattr(spec.compiler, name, NEUTRAL[name])
-        return _compiled(spec)
-
-    @cached_property
-    def exact(self) -> tuple[Any, Any] | None:
-        """With exact volumes of meshes, of which MuJoCo counts parts twice by default.
-
-        None without such meshes, or if MuJoCo refuses one: its surface is open, or inside out.
-        """
-        spec = self._spec.copy()
-        counted = [mesh for mesh in spec.meshes if mesh.inertia == mujoco.mjtMeshInertia.mjMESH_INERTIA_LEGACY]
-        for mesh in counted:
-            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT
-        return _compiled(spec) if counted else None
-
-    @cached_property
-    def without_visual(self) -> tuple[Any, Any] | None:
-        """Without mass of geometries that collide with nothing, and of which the file gives no mass.
-
-        Those of a body that has no other geometry keep theirs. None without such geometries.
-        """
-        spec, changed = self._spec.copy(), False
-        for body in spec.bodies:
-            visual = [geom for geom in body.geoms if not (geom.contype or geom.conaffinity or spec.pairs)]
-            for geom in visual if len(visual) < len(body.geoms) else ():
-                changed = changed or math.isnan(geom.mass)
-                geom.mass = 0.0 if math.isnan(geom.mass) else geom.mass
-        return _compiled(spec) if changed else None
+    Those of a body that has no other geometry keep theirs. None without such geometries.
+    """
+    spec, changed = spec.copy(), False
+    for body in spec.bodies:
+        visual = [geom for geom in body.geoms if not (geom.contype or geom.conaffinity or spec.pairs)]
+        for geom in visual if len(visual) < len(body.geoms) else ():
+            changed = changed or math.isnan(geom.mass)
+            geom.mass = 0.0 if math.isnan(geom.mass) else geom.mass
+    return _compiled(spec) if changed else None
 
 
 def _compiled(spec: Any) -> tuple[Any, Any] | None:

@@ -8,11 +8,11 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import MassProperties
 from dropspin.comparisons.diagnosis.mjcf_defaults import mjcf_setting, option_setting
+from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
 from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
 from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, pair_element
-from dropspin.comparisons.diagnosis.mujoco_file import MuJoCoFile
-from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL
+from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, without
 from dropspin.comparisons.diagnosis.source import Element, Setting, tagged
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
@@ -27,18 +27,14 @@ class BodyText:
     """What a file says of a body.
 
     Args:
-        file: The file.
-        head: The number of the body.
-        surface: The number of the geometry that it lands on.
-        touching: The numbers of the geometries that touch it.
-        contacts: The settings of the contacts with it, by the numbers of all geometries that collide with it.
+        alone: The body, and what it lands on.
+        touching: The settings of the contacts with it, by the numbers of the geometries that touch it.
     """
 
-    def __init__(
-        self, file: MuJoCoFile, head: int, surface: int | None, touching: Sequence[int], contacts: Mapping[int, Mapping[str, Any]]
-    ) -> None:
-        self.file, self.head, self._surface, self._touching, self._contacts = file, head, surface, touching, contacts
-        self.model, self.group = file.model, file.group(head)
+    def __init__(self, alone: MuJoCoAlone, touching: Mapping[int, Mapping[str, Any]]) -> None:
+        self.file, self.model, self.head, self.group = alone.file, alone.file.model, alone.head, alone.group
+        self._surface, self._touching = alone.surface, touching
+        self._contacts = {**touching, **{geom: alone.in_force_of(geom) for geom in alone.pairs if geom not in touching}}
 
     @cached_property
     def element(self) -> Element | None:
@@ -63,7 +59,7 @@ class BodyText:
     @property
     def unchanged(self) -> MassProperties | None:
         """Those that the file has before the compiler changes them; impossible ones are balanced."""
-        return self.properties(self.file.recompiled.without(*NEUTRAL))
+        return self.properties(without(self.file.spec, *NEUTRAL))
 
     def properties(self, compiled: tuple[Any, Any] | None) -> MassProperties | None:
         """Those of the body and of what is welded to it in a compiled model with its data; None without mass or without a model."""

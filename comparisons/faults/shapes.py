@@ -5,6 +5,7 @@ They show at an impact. The inertia may be the scene's, or that of the shape tha
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -37,42 +38,34 @@ def _built_as(kind: type[Shape], instead: Instead, inertia: str = "") -> Simulat
     return simulated
 
 
-def _lengths(**changed: Callable[[Any], float]) -> Instead:
-    """The same shape with some lengths changed."""
-    return lambda body: (
-        {"shape": body.shape, "radius": body.radius, "half_length": body.half_length}
-        | {name: change(body) for name, change in changed.items()}
-    )
+def _lengths(half_length: Callable[[float, float], float], shape: str = "") -> Instead:
+    """The same or another shape along an axis, with a half length that is a function of the body's own and of its radius [m]."""
+    return lambda body: {"shape": shape or body.shape, "radius": body.radius, "half_length": half_length(body.half_length, body.radius)}
 
 
-WRONG: dict[str, tuple[type[Shape], Instead]] = {
-    "a cylinder appears to be built as a box": (
-        Cylinder,
-        lambda body: {"shape": "box", "half_extents": [body.radius, body.half_length, body.radius]},
-    ),
-    "a capsule appears to be built as a cylinder, without the half balls at its ends": (
-        Capsule,
-        lambda body: {"shape": "cylinder", "radius": body.radius, "half_length": body.half_length},
-    ),
-    "a capsule appears to be too short by its half balls; half_length is without them": (
-        Capsule,
-        _lengths(half_length=lambda body: abs(body.half_length - body.radius)),
-    ),
-    "the body appears to be half as long as it should be: is half_length read as a length?": (
-        OnAxis,
-        _lengths(half_length=lambda body: 0.5 * body.half_length),
-    ),
-    "the body appears to be twice as long as it should be: is a length read as half_length?": (
-        OnAxis,
-        _lengths(half_length=lambda body: 2.0 * body.half_length),
-    ),
-    "an ellipsoid appears to be built as a box": (Ellipsoid, lambda body: {"shape": "box", "half_extents": body.half_extents}),
-    "a mesh appears to be about the origin of its file; a state has the centre of mass": (
-        Mesh,
-        lambda body: {"shape": "mesh", "points": body.points, "faces": body.faces, "center_of_mass": [0.0, 0.0, 0.0]},
-    ),
+def _about_origin(body: Mesh) -> Mapping[str, Any]:
+    return {"shape": "mesh", "points": body.points, "faces": body.faces, "center_of_mass": [0.0, 0.0, 0.0]}
+
+
+WRONG: dict[type[Any], dict[str, Instead]] = {
+    Cylinder: {
+        "a cylinder appears to be built as a box": lambda body: {
+            "shape": "box",
+            "half_extents": [body.radius, body.half_length, body.radius],
+        }
+    },
+    Capsule: {
+        "a capsule appears to be built as a cylinder, without the half balls at its ends": _lengths(lambda half, _: half, "cylinder"),
+        "a capsule appears to be too short by its half balls; half_length is without them": _lengths(lambda half, ball: abs(half - ball)),
+    },
+    OnAxis: {
+        "the body appears to be half as long as it should be: is half_length read as a length?": _lengths(lambda half, _: 0.5 * half),
+        "the body appears to be twice as long as it should be: is a length read as half_length?": _lengths(lambda half, _: 2.0 * half),
+    },
+    Ellipsoid: {"an ellipsoid appears to be built as a box": lambda body: {"shape": "box", "half_extents": body.half_extents}},
+    Mesh: {"a mesh appears to be about the origin of its file; a state has the centre of mass": _about_origin},
 }
-"""By the fault, the kind of body, and what is built instead."""
+"""By the kind of body: the message of each fault, and what is built instead."""
 
 
 def _turned(turn: Array) -> Reported:
@@ -97,8 +90,8 @@ def _along(number: int) -> Iterator[FaultModel]:
 
 
 def _otherwise() -> Iterator[FaultModel]:
-    for message, (kind, instead) in WRONG.items():
-        for inertia in ("", "solid"):
+    for kind, faults in WRONG.items():
+        for (message, instead), inertia in product(faults.items(), ("", "solid")):
             yield FaultModel(message, _built_as(kind, instead, inertia), about="shape")
 
 

@@ -4,8 +4,8 @@ The same definitions apply to one motion and to many at once. A quantity of a mo
 a quantity at each state has shape (..., n).
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -80,22 +80,11 @@ class Setup:
     @classmethod
     def of_starts(cls, scenes: Sequence[Scenario]) -> "Setup":
         """The setups of scenes that differ in their starts alone."""
-        body, starts = scenes[0].body, initial_states(scenes)
-        shared = cls.of(scenes[0])._with_arrays(lambda values: values[np.newaxis])
-        origin, clearance = (
-            np.array([energy_origin(scene) for scene in scenes]),
-            clearances(starts, body.vertices, body.semi_axes),
-        )
-        return replace(shared, origin=origin, clearance=clearance)
-
-    def __getitem__(self, motions: RowNumbers | Mask) -> "Setup":
-        """The setups of a selection of the motions."""
-        return self._with_arrays(lambda values: values if len(values) == 1 else values[motions])
-
-    def _with_arrays(self, change: Callable[[Array], Array]) -> "Setup":
-        changed: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
-        changed.update({name: change(value) for name, value in changed.items() if isinstance(value, np.ndarray)})
-        return Setup(**changed)
+        setup, body = cls.of(scenes[0]), scenes[0].body
+        arrays: dict[str, Any] = {name: value[np.newaxis] for name, value in vars(setup).items() if isinstance(value, np.ndarray)}
+        arrays["origin"] = np.array([energy_origin(scene) for scene in scenes])
+        arrays["clearance"] = clearances(initial_states(scenes), body.vertices, body.semi_axes)
+        return replace(setup, **arrays)
 
     @cached_property
     def starts_above_floor(self) -> Mask:

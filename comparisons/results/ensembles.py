@@ -40,19 +40,11 @@ class EnsembleMetric:
     of_each: Callable[[EnsembleOutcome], Array]
 
 
+OF_SCENE = "divided by the scene's energy (of the fall, or of the initial motion)."
+AFTER_CONTACT = "Largest height of the centre of mass after the first contact, divided by the initial height; 0 without a contact."
 ENSEMBLE_METRICS = {
-    "energy_halfway": EnsembleMetric(
-        "1",
-        "Energy at half the duration, divided by the scene's energy (of the fall, or of the initial motion).",
-        lambda o: o.energy[:, SAMPLES // 2],
-    ),
-    "energy_at_end": EnsembleMetric(
-        "1", "Energy at the end, divided by the scene's energy (of the fall, or of the initial motion).", lambda o: o.energy[:, -1]
-    ),
-    "rebound_height": EnsembleMetric(
-        "1",
-        "Largest height of the centre of mass after the first contact, divided by the initial height; 0 without a contact.",
-        lambda o: o.rebound,
-    ),
+    "energy_halfway": EnsembleMetric("1", f"Energy at half the duration, {OF_SCENE}", lambda o: o.energy[:, SAMPLES // 2]),
+    "energy_at_end": EnsembleMetric("1", f"Energy at the end, {OF_SCENE}", lambda o: o.energy[:, -1]),
+    "rebound_height": EnsembleMetric("1", AFTER_CONTACT, lambda o: o.rebound),
     "rest_time": EnsembleMetric("s", "Last time at which the body moved; the scene's end if it still moves.", lambda o: o.rest_time),
 }

@@ -8,7 +8,7 @@ from itertools import groupby
 
 import numpy as np
 
-from dropspin.comparisons.published.results import EXACT, Agreement, Result, agreement
+from dropspin.comparisons.published.results import EXACT, Result, Status, compared
 from dropspin.comparisons.published.sources import DATA, Source
 from dropspin.scenarios import Scenario, Truth, load
 from dropspin.scenarios.mechanics import kinetic_energy
@@ -47,9 +47,9 @@ def nesc_brick(source: Source) -> Iterator[Result]:
         yield _error(source, name, quantity, rows[worst][RATES[rate]], float(rates[worst, rate]))
 
 
-def _beside_exact(source: Source, tool: str, quantity: str, published: str, match: Agreement) -> Result:
+def _beside_exact(source: Source, tool: str, quantity: str, published: str, exact: float, significant: int = 0) -> Result:
     """A published value that is claimed to be exact beside the exact one."""
-    return Result(source.name, tool, quantity, published, match.here, EXACT, match.status, difference=match.difference)
+    return compared(Result(source.name, tool, quantity, published, "", EXACT, "not run"), exact, significant)
 
 
 def _error(source: Source, tool: str, quantity: str, published: str, exact: float, decimals: int = DECIMALS) -> Result:
@@ -60,14 +60,8 @@ def _error(source: Source, tool: str, quantity: str, published: str, exact: floa
 
 def _count(source: Source, tool: str, quantity: str, published: int, here: int) -> Result:
     """How many of some values have equal digits."""
-    match = Agreement(f"{here} equal", float(here - published), here == published)
-    return _beside_exact(source, tool, quantity, f"{published} equal", match)
-
-
-def _digits(source: Source, tool: str, quantity: str, published: float, here: float) -> Result:
-    """A value of a formula beside that of the exact solution, to `DECIMALS`."""
-    text = f"{published:.{DECIMALS}f}"
-    return _beside_exact(source, tool, quantity, text, agreement(text, here))
+    status: Status = "reproduced" if here == published else "differs"
+    return Result(source.name, tool, quantity, f"{published} equal", f"{here} equal", EXACT, status, difference=float(here - published))
 
 
 def kane_free_body(source: Source) -> Iterator[Result]:
@@ -115,8 +109,9 @@ def _kane_results(source: Source, scene: Scenario, truth: Truth, t: float) -> li
     quaternion = state[0, ORIENTATION]
     sign = math.copysign(1.0, float(quaternion @ list(published.values())[:4]))
     here = [*(sign * quaternion), *body_rates(state)[0], *state[0, POSITION]]
-    values = zip(published.items(), here, strict=True)
-    return [_digits(source, "formula", f"{name} at {t:g} s", value, float(exact)) for (name, value), exact in values]
+    digits = {f"{name} at {t:g} s": f"{value:.{DECIMALS}f}" for name, value in published.items()}
+    values = zip(digits.items(), here, strict=True)
+    return [_beside_exact(source, "formula", quantity, value, float(exact)) for (quantity, value), exact in values]
 
 
 def _simple_rotation(source: Source, scene: Scenario, axis: Sequence[float], rate: float, time: float) -> Result:
@@ -127,9 +122,8 @@ def _simple_rotation(source: Source, scene: Scenario, axis: Sequence[float], rat
     expected = about(direction, np.array([rate * time]))[0]
     error = float(min(np.abs(quaternion - expected).max(), np.abs(quaternion + expected).max()))
     bound = f"≤ {source.parameters['simple']['bound_in_epsilon'] * EPSILON:.2g}"
-    match = agreement(bound, error)._replace(here=f"{error:.2g}")
     quantity = f"quaternion, axis {' '.join(f'{component:g}' for component in axis)}"
-    return _beside_exact(source, "simple rotation", quantity, bound, match)
+    return replace(_beside_exact(source, "simple rotation", quantity, bound, error), here=f"{error:.2g}")
 
 
 def housner_block(source: Source) -> Iterator[Result]:
@@ -140,12 +134,11 @@ def housner_block(source: Source) -> Iterator[Result]:
         impact = exact_solution(scene).events[0]
         before, after = (Trajectory.from_states(np.zeros(1), state[None]) for state in (impact.before, impact.after))
         ratio = float((kinetic_energy(scene, after) / kinetic_energy(scene, before))[0])
-        yield _digits(source, "restitution", f"r, tan α = {slope:g}", housner_ratio(alpha), ratio)
+        yield _beside_exact(source, "restitution", f"r, tan α = {slope:g}", f"{housner_ratio(alpha):.{DECIMALS}f}", ratio)
     for alpha, share, digits in source.parameters["periods"]:
         published = housner_period(share)
         exact = 4.0 * exact_solution(rocking_scene(alpha, share)).events[0].time
-        match = agreement(f"{published:.{digits}g}", exact, digits)
-        result = _beside_exact(source, "period", f"T [s], α = {alpha:g}, θ₀ = {share:g} α", f"{published:.{digits}g}", match)
+        result = _beside_exact(source, "period", f"T [s], α = {alpha:g}, θ₀ = {share:g} α", f"{published:.{digits}g}", exact, digits)
         is_slender = alpha == source.parameters["slender"]
         yield result if is_slender else replace(result, status="error of the source", difference=published - exact)
 

@@ -4,7 +4,7 @@ import math
 import re
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.running.driving import Breakdown
@@ -56,45 +56,29 @@ SHOWN = 6
 """Significant digits of a value that is compared with a bound or within a tolerance."""
 
 
-class Agreement(NamedTuple):
-    """A value beside printed digits.
-
-    Attributes:
-        here: The value, to the digits of the source.
-        difference: The value minus the printed one, or minus the bound.
-        agrees: Whether the digits are equal, or the value is within the bound or the tolerance that the source states.
-    """
-
-    here: str
-    difference: float
-    agrees: bool
-
-    @property
-    def status(self) -> Status:
-        """The status of a value that is claimed to be reproducible."""
-        return "reproduced" if self.agrees else "differs"
-
-
-def agreement(printed: str, value: float, significant: int = 0) -> Agreement:
-    """Compare a value with printed digits.
+def compared(result: Result, value: float, significant: int = 0) -> Result:
+    """A result with the value that was found, which is claimed to have the published digits, or to be within the bound or the tolerance.
 
     Args:
-        printed: The digits, or a bound such as `< 1.01`, or a value with the source's tolerance such as `0.25±0.0025`.
+        result: The result without a value; published are digits, a bound such as `< 1.01`, or a value with the source's tolerance such as
+            `0.25±0.0025`.
         value: The value.
         significant: Number of significant digits of the source, if it drops trailing zeros.
     """
-    shown = f"{value:.{SHOWN}g}"
+    printed, here = result.published, f"{value:.{SHOWN}g}"
     if bound := BOUND.fullmatch(printed):
-        limit = float(bound[2])
-        at_most = value <= limit or math.isclose(value, limit, rel_tol=ROUNDING)
-        return Agreement(shown, value - limit, {"<": value < limit, ">": value > limit, "≤": at_most}[bound[1]])
-    if TOLERANCE in printed:
+        expected = float(bound[2])
+        at_most = value <= expected or math.isclose(value, expected, rel_tol=ROUNDING)
+        agrees = {"<": value < expected, ">": value > expected, "≤": at_most}[bound[1]]
+    elif TOLERANCE in printed:
         expected, tolerance = map(float, printed.split(TOLERANCE))
-        return Agreement(shown, value - expected, abs(value - expected) <= tolerance + ROUNDING * abs(expected))
-    if math.isnan(value):
-        return Agreement(shown, math.nan, agrees=False)
-    here = f"{value:.{significant}g}" if significant else _rounded(printed, value)
-    return Agreement(here, value - float(printed), Decimal(here) == Decimal(printed))
+        agrees = abs(value - expected) <= tolerance + ROUNDING * abs(expected)
+    else:
+        expected, agrees = float(printed), False
+        if not math.isnan(value):
+            here = f"{value:.{significant}g}" if significant else _rounded(printed, value)
+            agrees = Decimal(here) == Decimal(printed)
+    return replace(result, here=here, difference=value - expected, status="reproduced" if agrees else "differs")
 
 
 def with_value(result: Result, value: float | Breakdown, why_not: str, significant: int = 0) -> Result:
@@ -104,7 +88,7 @@ def with_value(result: Result, value: float | Breakdown, why_not: str, significa
         result: The result without a value.
         value: The value.
         why_not: Why no engine can give the published value here; empty if one can.
-        significant: As in `agreement`.
+        significant: As in `compared`.
     """
     if isinstance(value, Breakdown):
         if not result.by or value.verdict == "declined":
@@ -112,9 +96,8 @@ def with_value(result: Result, value: float | Breakdown, why_not: str, significa
         return replace(result, reason=value.reason, verdict=value.verdict)
     if result.published == ABSENT:
         return replace(result, here=f"{value:.{SHOWN}g}", status="for comparison")
-    match = agreement(result.published, value, significant)
-    result = replace(result, here=match.here, difference=match.difference, status=match.status)
-    return replace(result, status="not reproducible", reason=why_not) if why_not and not match.agrees else result
+    result = compared(result, value, significant)
+    return replace(result, status="not reproducible", reason=why_not) if why_not and result.status == "differs" else result
 
 
 def _rounded(printed: str, value: float) -> str:

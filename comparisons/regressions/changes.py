@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING, STUDIES
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.results.results import Results
-from dropspin.comparisons.results.table import OF_SYMMETRIES
+from dropspin.comparisons.results.table import OF_SYMMETRIES, are_among
 from dropspin.scenarios import DropspinError, Trajectory
 
 KEY = ["scene", "engine", "steps", "metric", "kind"]
@@ -80,9 +80,8 @@ def asked_for(held: pd.DataFrame, results: Results) -> pd.DataFrame:
 
 def broke_down(rows: pd.DataFrame, results: Results) -> "pd.Series[bool]":
     """Whether each row belongs to an engine that broke down in the scene, or is missing."""
-    pairs = ["scene", "engine"]
-    broken = results.table.loc[results.table["verdict"].isin(BREAKDOWNS | {"missing"}), pairs]
-    return pd.Series(pd.MultiIndex.from_frame(rows[pairs]).isin(pd.MultiIndex.from_frame(broken)), rows.index)
+    broken = results.table[results.table["verdict"].isin(BREAKDOWNS | {"missing"})]
+    return are_among(rows, broken, ["scene", "engine"])
 
 
 @np.errstate(over="ignore", invalid="ignore")  # an engine may return 1e300, and a baseline have such a tolerance

@@ -33,7 +33,7 @@ from dropspin.comparisons.regressions.changes import (
 )
 from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
-from dropspin.comparisons.results.table import Measurement, as_table
+from dropspin.comparisons.results.table import Measurement, are_among, as_table
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.validation import validated
 
@@ -107,7 +107,7 @@ def accept(
     settings = {engine: common_settings(stamp, engine) for engine in adapters}
     content = {"date": date, "reason": reason, "versions": versions_behind(stamp), "cpu": stamp["cpu"], "code": stamp["code"]}
     acceptance = validated(Acceptance, "accept", content | {"adapters": adapters, "settings": settings})
-    moved = measured[~_keys(measured).isin(_keys(kept))].assign(by=acceptance.key)
+    moved = measured[~are_among(measured, kept, KEY)].assign(by=acceptance.key)
     outside = earlier.results.drop(covered.index)
     is_of_another_scene = _has_other_scene(outside, earlier, results)
     table = pd.concat([outside[~is_of_another_scene], kept, moved], ignore_index=True)[list(COLUMNS)]
@@ -158,7 +158,7 @@ def check(results: Results, baseline: Baseline | str | Path | None = None) -> Ch
         )
     of_other_scenes = _has_other_scene(accepted, baseline, results)
     measured = comparable_results(results)
-    comparable = measured[~_keys(measured).isin(_keys(accepted[of_other_scenes]))]
+    comparable = measured[~are_among(measured, accepted[of_other_scenes], KEY)]
     found = changes(accepted[~of_other_scenes], comparable).merge(accepted[[*KEY, "by", "known_failure"]], on=KEY, how="left")
     found = most_changed_first(found)
     causes = _causes(found, baseline, results)
@@ -186,10 +186,6 @@ def _has_other_scene(rows: pd.DataFrame, baseline: Baseline, results: Results) -
     pairs = zip(rows["by"], rows["scene"], strict=True)
     differ = [scene in results.scenes and baseline.scenes[by][scene] != results.scenes[scene].digest for by, scene in pairs]
     return pd.Series(differ, rows.index, dtype=bool)
-
-
-def _keys(rows: pd.DataFrame) -> pd.MultiIndex:
-    return pd.MultiIndex.from_frame(rows[KEY])
 
 
 def _causes(found: pd.DataFrame, baseline: Baseline, results: Results) -> dict[int, Attribution]:
@@ -254,7 +250,7 @@ def _with_known_failures(results: Results, found: pd.DataFrame) -> pd.DataFrame:
     """The run's table, in which failures that were accepted as known and are not worse have the verdict `known`."""
     known = found[found["known_failure"].fillna(value=False).astype(bool) & (found["change"].map(VERDICTS) == "passed")]
     table = results.table.copy()
-    rows = _keys(table.assign(steps=step_names(results))).isin(_keys(known)) & table["verdict"].isin(FAILURES).to_numpy()
+    rows = are_among(table.assign(steps=step_names(results)), known, KEY) & table["verdict"].isin(FAILURES)
     table.loc[rows, "reason"] = "accepted as a known failure; " + table.loc[rows, "reason"]
     table.loc[rows, ["basis", "verdict"]] = ["accepted_failure", "known"]
     return table

@@ -10,6 +10,7 @@ from dropspin.comparisons.regressions.changes import KEY, asked_for, changes, co
 from dropspin.comparisons.regressions.comparing import attributed, results_in_common, unmoved_engines
 from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.results.table import are_among
 from dropspin.scenarios import DropspinError
 
 CHANGED = ["worse", "moved", "better", "gone"]
@@ -122,6 +123,6 @@ def _since(keys: pd.DataFrame, earlier: Sequence[pd.DataFrame], now: pd.DataFram
         found = found[found["change"].isin(CHANGED)]
         if len(found):
             yield number, most_changed_first(found)
-            keys = keys[~pd.MultiIndex.from_frame(keys).isin(pd.MultiIndex.from_frame(found[KEY]))]
+            keys = keys[~are_among(keys, found, KEY)]
         if keys.empty:
             return

@@ -11,6 +11,7 @@ from dropspin.comparisons.judging.convergence import JUMPING
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.results.results import Results, relative_sizes
+from dropspin.comparisons.results.table import are_among
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.truths import exact_solution
 
@@ -98,8 +99,7 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     uncertain = np.array(relative_sizes(errors.assign(value=errors["tolerance"].fillna(0.0)), results.scenes))
     states = np.select([sizes + uncertain <= within, sizes - uncertain > within], ["within", "beyond"], "undecided")
     lost = table[table["metric"].isin(JUMPING) & (table["kind"] == "asymptotic_error") & (table["verdict"] == "failed")]
-    pair = ["scene", "engine"]
-    is_lost = pd.MultiIndex.from_frame(errors[pair]).isin(pd.MultiIndex.from_frame(lost[pair])) & (errors["metric"] != "position_error")
+    is_lost = are_among(errors, lost, ["scene", "engine"]) & (errors["metric"] != "position_error")
     states = np.where(is_lost & (states == "within"), "undecided", states)
     found = errors.assign(size=sizes, state=states, cost=errors["time_per_step"] / errors["dt"])
     remains = results.asymptotic_errors("model", "setting")

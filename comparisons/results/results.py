@@ -16,7 +16,7 @@ from dropspin.comparisons.measuring.metrics import leading_metric
 from dropspin.comparisons.measuring.tolerances import NEGLIGIBLE, scale
 from dropspin.comparisons.results.ensembles import EnsembleOutcome
 from dropspin.comparisons.results.provenance import digest
-from dropspin.comparisons.results.table import empty_table
+from dropspin.comparisons.results.table import are_among, empty_table
 from dropspin.scenarios import Scenario, Trajectory, UnknownName, reference_for
 
 TrajectoryKey = tuple[str, str, float]
@@ -194,10 +194,8 @@ class Results:
 
         An error that fails at another time step, or as dt → 0 alone, is one of them.
         """
-        of = ["scene", "engine", "metric"]
-        failed = pd.MultiIndex.from_frame(self.table.loc[self.table["verdict"].isin(FAILURES), of])
-        is_finding = rows["verdict"].isin(["known", "limited"]) | pd.MultiIndex.from_frame(rows[of]).isin(failed)
-        findings = rows[is_finding & (rows["value"].abs() > SMALLEST_STATED)]
+        failed = are_among(rows, self.table[self.table["verdict"].isin(FAILURES)], ["scene", "engine", "metric"])
+        findings = rows[(failed | rows["verdict"].isin(["known", "limited"])) & (rows["value"].abs() > SMALLEST_STATED)]
         findings = findings[~findings["metric"].isin([*JUMPING, *ARTEFACTS, *PARTS])]
         if findings.empty:
             return ""

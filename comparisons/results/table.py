@@ -124,6 +124,12 @@ def as_table(measurements: Sequence[Measurement]) -> pd.DataFrame:
     return pd.DataFrame(map(vars, measurements), columns=list(COLUMNS)).astype(COLUMNS)
 
 
+def are_among(rows: pd.DataFrame, others: pd.DataFrame, columns: Sequence[str]) -> "pd.Series[bool]":
+    """Whether each row of a table has the values that a row of another table has in some columns."""
+    keys, known = (pd.MultiIndex.from_frame(table[list(columns)]) for table in (rows, others))
+    return pd.Series(keys.isin(known), rows.index)
+
+
 def empty_table() -> pd.DataFrame:
     """A table without rows."""
     return as_table([])

@@ -54,8 +54,8 @@ class Claim(NamedTuple):
     """The properties that an engine declares for a scene: order of accuracy or None, precision of the state, limitations it met."""
 
     label: str
-    order: float | None
-    precision: type
+    order: float | None = None
+    precision: type = np.float64
     limitations: tuple[KnownLimitation, ...] = ()
 
 

@@ -4,9 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
-from dropspin.comparisons.engines.base import KnownLimitation
+from dropspin.comparisons.judging.convergence import Claim
 from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, EnsembleOutcome
@@ -25,30 +23,24 @@ class EngineRun:
     """What one engine did with one scene at one time step.
 
     Attributes:
-        label: The engine's label.
+        claim: What the engine declares, and the limitations that it met.
         breakdown: Why there is no motion; None if there is one.
         motion: From the scene's own start, every step.
         phases: From each start phase.
-        limitations: Known limitations that the engine met.
         settings: The settings that it reported.
         outcome: What became of the scene's ensemble.
         discretisation: The discretisation that the engine states for this scene.
-        order: The order that it claims.
-        precision: Of its state.
         predicted: Errors by metric that its scheme must have.
         uncertainties: By metric, the largest value that the recording of the scene leaves an engine without an error.
     """
 
-    label: str
+    claim: Claim
     breakdown: Breakdown | None = None
     motion: Trajectory | None = None
     phases: list[Trajectory] = field(default_factory=list)
-    limitations: Sequence[KnownLimitation] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     outcome: EnsembleOutcome | None = None
     discretisation: str | None = None
-    order: float | None = None
-    precision: type = np.float64
     predicted: dict[str, float] = field(default_factory=dict)
     uncertainties: dict[str, float] = field(default_factory=dict)
 
@@ -71,17 +63,17 @@ def run_engine(
         quick: Whether few members of an ensemble are run.
         on_simulations: Called after each simulation.
     """
-    engine, found = entry.adapter, EngineRun(entry.label)
+    engine, found = entry.adapter, EngineRun(Claim(entry.label))
     try:
         verify_accepted(engine, scene)
-        found.discretisation, found.order, found.precision = verified_claims(engine, scene)
+        found.discretisation, order, precision = verified_claims(engine, scene)
         others = starts if len(starts) > 1 else []
         size = 0 if scene.recording is None else len(starts) // PHASES_OF_TOSS
         drawn = size and size * simulations_of(size)
         total = 1 + len(others) + drawn
         own = record(engine, scene, dt)
         on_simulations(1, total)
-        found.motion, found.limitations, found.settings = own.motion, own.limitations, own.settings
+        found.motion, found.settings, found.claim = own.motion, own.settings, Claim(entry.label, order, precision, own.limitations)
         recorded = record_batch(engine, others, dt, lambda done, _: on_simulations(1 + done, total)) if others else [own]
         found.phases = [recording.motion for recording in recorded]
         found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt, QUICK_MEMBERS if quick else None)

@@ -103,7 +103,7 @@ class EngineStudy:
         self, entry: EngineEntry, phases: Sequence[StartPhase], progress: Progress, timing: Timing, *, perturbs: bool = True
     ) -> tuple[Outcome, list[Comparison]]:
         """Simulate the scene from all start phases, and measure every metric; from perturbed starts too, if the uncertainty matters."""
-        scene, dt, run, size = self.own.scene, progress.dt, EngineRun(entry.label), len(phases)
+        scene, dt, run, size = self.own.scene, progress.dt, EngineRun(Claim(entry.label)), len(phases)
         if not timing.ended:
             starts = [phase.scene for phase in phases]
             perturbed = number_of_simulations(self.own, entry.adapter.precision, size) if perturbs else 0
@@ -112,7 +112,7 @@ class EngineStudy:
                 self.on_progress(progress._replace(done=done, total=total and total + perturbed))
 
             answer = self.processes.call(entry, run_engine, scene, dt, starts, self.own.quick, on_simulations=on_simulations)
-            run = EngineRun(entry.label, answer) if isinstance(answer, Breakdown) else answer
+            run = EngineRun(Claim(entry.label), answer) if isinstance(answer, Breakdown) else answer
         motions = [] if run.motion is None else [run.motion, *run.phases]
         run.breakdown = run.breakdown or timing.breakdown or next(filter(None, map(divergence, motions)), None)
         cases, changes = [] if run.breakdown else compare(run.phases, phases), []
@@ -123,7 +123,7 @@ class EngineStudy:
                 self.on_progress(progress._replace(done=before + done, total=before + perturbed))
 
             try:
-                changes = changes_of_metrics(self.own, entry, phases, cases, dt, run.precision, self.processes, on_perturbed)
+                changes = changes_of_metrics(self.own, entry, phases, cases, dt, run.claim.precision, self.processes, on_perturbed)
             except Breakdown as breakdown:
                 run.breakdown, cases = breakdown, []
         points = measure(self.own, dt, run, cases, changes) if cases else {}
@@ -141,10 +141,10 @@ class EngineStudy:
             if run.breakdown is not None:
                 yield timed.remark(run.breakdown.verdict, run.breakdown.reason)
                 continue
-            yield from (timed.remark("limited", limitation.message) for limitation in run.limitations if not limitation.is_minor)
+            yield from (timed.remark("limited", limitation.message) for limitation in run.claim.limitations if not limitation.is_minor)
             for name, point in points.items():
                 metric = METRICS[name]
-                judgement = judge(scene, truth, _claim(run), metric, point, causes.get(name))
+                judgement = judge(scene, truth, run.claim, metric, point, causes.get(name))
                 yield timed.measurement(metric.kind, name, metric.unit, judgement, truths[metric.kind])
                 if metric.kind == "truth" and name in run.uncertainties:
                     uncertainty = Judgement(run.uncertainties[name], "measured")
@@ -199,7 +199,7 @@ class EngineStudy:
         A limitation that it met at coarser ones alone vanishes with the time step, and explains no error that does not.
         """
         moved = [outcome for outcome in self.outcomes if outcome.run.motion is not None]
-        return _claim(min(moved, key=lambda outcome: outcome.case.dt).run)
+        return min(moved, key=lambda outcome: outcome.case.dt).run.claim
 
     @cached_property
     def series(self) -> Mapping[str, list[SeriesPoint]]:
@@ -293,8 +293,3 @@ class EngineStudy:
                 self.added[entry.label, dt] = outcome.points
             points.append(self.added.get((entry.label, dt), {}).get(metric.name))
         return [point for point in points if point is not None]
-
-
-def _claim(run: EngineRun) -> Claim:
-    """The properties that an engine declares, and the limitations that it met in a run."""
-    return Claim(run.label, run.order, run.precision, tuple(run.limitations))

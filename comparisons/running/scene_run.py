@@ -87,10 +87,10 @@ def _agreement(own: StartPhase, first: Compared, second: Compared) -> Iterator[M
     ((case, _, one, _, _), cases), ((_, _, other, _, _), other_cases) = first, second
     shared = one.discretisation if one.discretisation == other.discretisation else None
     for metric, judgement in judge_agreement(own.scene, own.truth, cases, other_cases, shared):
-        yield case.measurement("agreement", metric.name, metric.unit, judgement, other.label)
+        yield case.measurement("agreement", metric.name, metric.unit, judgement, other.claim.label)
     if one.outcome is not None and other.outcome is not None:
         for name, judgement in judge_differences(one.outcome, other.outcome):
-            yield case.measurement("agreement", name, ENSEMBLE_METRICS[name].unit, judgement, other.label)
+            yield case.measurement("agreement", name, ENSEMBLE_METRICS[name].unit, judgement, other.claim.label)
 
 
 def _distances_to_other_laws(

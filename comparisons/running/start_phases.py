@@ -123,7 +123,7 @@ def measure(
     own: StartPhase, dt: float, run: EngineRun, cases: Sequence[Comparison], changes: Sequence[Mapping[str, float]]
 ) -> dict[str, SeriesPoint]:
     """Every metric of one engine at one time step, by name; `changes`: of each metric, with each set of perturbed starts."""
-    scene, quick, precision = own.scene, own.quick, run.precision
+    scene, quick, precision = own.scene, own.quick, run.claim.precision
     steps, found = scene.steps(dt), {}
     for metric in metrics_for(scene, own.truth):
         components, noise, rounded, unresolved = None, 0.0, 0.0, None

@@ -9,6 +9,7 @@ import pytest
 from support.cli import DROPSPIN
 
 import dropspin as ds
+from dropspin.comparisons.judging.convergence import Claim
 from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.engine_run import EngineRun, motions_from
 from dropspin.comparisons.running.inputs import MOST_ROWS
@@ -31,7 +32,7 @@ def test_reason_why_a_metric_is_unresolved_keeps_no_motion():
     own, dt = StartPhase(BALL, ds.truth_for(BALL)), 0.2
     motion = ds.simulate(BALL, "wang", dt)
     cases = compare([motion], [own])
-    points = measure(own, dt, EngineRun("wang", motion=motion), cases, [])
+    points = measure(own, dt, EngineRun(Claim("wang"), motion=motion), cases, [])
     assert any(point.unresolved is not None for point in points.values())
     case = weakref.ref(cases[0])
     del cases

@@ -13,7 +13,7 @@ from dropspin.comparisons.diagnosis.loose_body import MassProperties
 from dropspin.comparisons.diagnosis.mjcf_defaults import option_setting
 from dropspin.comparisons.diagnosis.mujoco_elements import children_of
 from dropspin.comparisons.diagnosis.mujoco_file import BODY
-from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, with_exact_volumes, without, without_visual
+from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, with_exact_volumes, without, without_mass_of, without_visual
 from dropspin.comparisons.diagnosis.mujoco_shapes import mesh_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText, differ
 from dropspin.comparisons.diagnosis.source import Ignored, Setting
@@ -88,15 +88,16 @@ def _meshes(text: BodyText) -> Iterator[Ignored]:
         meshes = [mesh for mesh in every if mesh.attributes.get("name", Path(mesh.attributes.get(key, "")).stem) in used]
         return meshes[0].words if meshes else Setting("a mesh")
 
+    has, exact = text.properties(text.file.compiled), text.properties(with_exact_volumes(text.file.spec))
     for geom, name in names.items():
         points, faces = mesh_of(model, geom)
-        if not is_whole(points, faces):
+        rest = None if is_whole(points, faces) else text.properties(without_mass_of(text.file.spec, geom))
+        if not is_whole(points, faces) and (rest is None or has is None or differ(rest.mass, has.mass)):
             made = "but mass and inertia are those of the first object of its file"
             yield "mesh", words(name), f"read in part: all of its {len(points)} vertices collide, {made}"
-    has, exact = text.properties(text.file.compiled), text.properties(with_exact_volumes(text.file.spec))
-    if has is not None and exact is not None and abs(has.mass - exact.mass) > NOTEWORTHY * exact.mass:
-        made = f'counted as {has.mass:.4g} kg by default; its volume has {exact.mass:.4g} kg, which inertia="exact" gives'
-        yield "mesh", words(*names.values()), made
+    if has is not None and exact is not None and abs(more := has.mass - exact.mass) > NOTEWORTHY * exact.mass:
+        made = f"counted with {abs(more):.4g} kg {'more' if more > 0.0 else 'less'} than its volume has"
+        yield "mesh", words(*names.values()), f'{made}, which inertia="exact" counts'
 
 
 def _of_links(text: BodyText) -> Iterator[Ignored]:

@@ -65,6 +65,14 @@ def without_visual(spec: Any) -> tuple[Any, Any] | None:
     return _compiled(spec) if changed else None
 
 
+@lru_cache(CHANGED)
+def without_mass_of(spec: Any, geom: int) -> tuple[Any, Any] | None:
+    """Without the mass of a geometry."""
+    spec = spec.copy()
+    spec.geoms[geom].mass = 0.0
+    return _compiled(spec)
+
+
 def _compiled(spec: Any) -> tuple[Any, Any] | None:
     """The model of a specification, with its data; None if MuJoCo refuses it."""
     with suppress(ValueError), quiet():

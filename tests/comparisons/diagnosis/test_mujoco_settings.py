@@ -318,10 +318,11 @@ def bracket(inertia):
 def test_mesh_of_which_parts_are_counted_twice_is_named(tmp_path):
     mass = 1000.0 * 0.02 * (0.2 * 0.02 + 0.18 * 0.02)
     head, world = bracket("")
-    [(name, setting, made)] = body_of(tmp_path, world, head=head).facts.ignored
+    facts = body_of(tmp_path, world.replace("<geom", '<geom size=".01" mass="2"/><geom', 1), head=head).facts
+    [(name, setting, made)] = facts.ignored
     assert name == "mesh"
     assert setting.line == 1
-    assert f"its volume has {mass:.4g} kg" in made
+    assert made.startswith(f"counted with {facts.mass - 2.0 - mass:.4g} kg more than its volume has")
     head, world = bracket('inertia="exact"')
     facts = body_of(tmp_path, world, head=head).facts
     assert facts.mass == pytest.approx(mass, rel=1e-6)
@@ -418,6 +419,15 @@ def test_mesh_of_several_objects_has_the_mass_of_the_first_one(tmp_path):
     [(name, words, made)] = body.facts.ignored
     assert (name, "two.obj" in str(words), made.startswith("read in part: all of its 16 vertices collide")) == ("mesh", True, True)
     assert body.facts.solid is None
+
+
+@pytest.mark.parametrize("mass", ['<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>', '<geom size=".1" mass="1"/>'])
+def test_mesh_of_several_objects_without_mass_is_not_named(tmp_path, mass):
+    (tmp_path / "two.obj").write_text(f"{cube(0)}\n{cube(1)}\n")
+    mesh = '<asset><mesh name="m" file="two.obj"/></asset>'
+    body = body_of(tmp_path, FREE.format(f'{mass}<geom name="g" type="mesh" mesh="m" mass="0"/>'), head=mesh)
+    assert body.facts.mass == pytest.approx(1.0)
+    assert body.facts.ignored == []
 
 
 @pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass' is deprecated")

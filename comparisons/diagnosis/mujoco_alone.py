@@ -28,6 +28,8 @@ NO_DAMPER = int(getattr(FLAGS, "mjDSBL_DAMPER", getattr(FLAGS, "mjDSBL_PASSIVE",
 """The flag that disables dampers, in older versions with all passive forces."""
 WIDE = 100.0
 """Half the width of a box that a body lands on [m]."""
+OFF_CENTRE = np.array([0.37, 0.0, 0.23])
+"""From the body to the centre of this box [m]: if one is above the other, contacts of convex shapes may jump from corner to corner."""
 
 
 class MuJoCoAlone:
@@ -168,9 +170,10 @@ class MuJoCoAlone:
         file, old = self.file, self.file.model
         assert self.surface is not None
         turn = multiply(self.level, quaternion(file.data.geom_xmat[self.surface]))
-        size, up = old.geom_size[self.surface], np.abs(unrotate(turn, UP))
-        is_box = old.geom_type[self.surface] == BOX
-        at = {"pos": -(size @ up) * is_box * UP, "quat": np.roll(turn, 1), "size": np.where(is_box & (up < 0.5), WIDE, size)}
+        at: dict[str, Any] = {"pos": np.zeros(3), "quat": np.roll(turn, 1)}
+        if old.geom_type[self.surface] == BOX:
+            half = float(old.geom_size[self.surface] @ np.abs(unrotate(turn, UP)))
+            at = {"pos": OFF_CENTRE - half * UP, "quat": [1.0, 0.0, 0.0, 0.0], "size": [WIDE, half, WIDE]}
         spec.worldbody.add_geom(name="surface", contype=0, conaffinity=0, **self._geom(spec, self.surface) | at)
         for geom in self.pairs:
             spec.add_pair(geomname1="surface", geomname2=f"own {self.geoms.index(geom)}", **self.in_force_of(geom))

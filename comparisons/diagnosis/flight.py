@@ -50,16 +50,14 @@ def spin(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     facts, answers = body.facts, []
     for number, axis in enumerate(facts.principal[1].T):
         direction, start = vector_text(axis), facts.start(spin=SPEED * axis)
-        tau = facts.slowed(number, SPEED)
-        if tau < TURN:
-            times = [_decay(body, start, dt, tau) for dt in dts]
-            slowed = Answer("spin", DECAY_TIME, "s", direction, physical=math.inf)
-            answers.append(judged(body, slowed, dts, times, [tau] * len(dts)))
+        exact = facts.slowed(number, SPEED)
+        if exact < TURN:
+            answer = Answer("spin", DECAY_TIME, "s", direction, physical=math.inf)
+            values = [_decay(body, start, dt, exact) for dt in dts]
         else:
-            ends = [_turned(body, start, dt) for dt in dts]
-            kept = [float(np.linalg.norm(end[SPIN])) / SPEED for end in ends]
-            exact = [facts.spun(number, SPEED, TURN) / SPEED] * len(dts)
-            answers.append(judged(body, Answer("spin", KEPT, "1", direction, physical=1.0), dts, kept, exact))
+            answer, exact = Answer("spin", KEPT, "1", direction, physical=1.0), facts.spun(number, SPEED, TURN) / SPEED
+            values = [float(np.linalg.norm(_turned(body, start, dt)[SPIN])) / SPEED for dt in dts]
+        answers.append(judged(body, answer, dts, values, [exact] * len(dts)))
     return answers
 
 

@@ -179,11 +179,8 @@ class Facts:
     @property
     def points(self) -> Array:
         """Points that bound the body, relative to the centre of mass, in the body frame [m], shape (n, 3)."""
-        found = []
-        for part in self.parts:
-            corners = (part.shape.hull[:, np.newaxis] + DIRECTIONS * part.shape.semi_axes).reshape(-1, 3)
-            found.append(part.position + rotate(part.turn, corners))
-        return np.concatenate(found)
+        corners = [(part.shape.hull[:, np.newaxis] + DIRECTIONS * part.shape.semi_axes).reshape(-1, 3) for part in self.parts]
+        return np.concatenate([part.position + rotate(part.turn, own) for part, own in zip(self.parts, corners, strict=True)])
 
     @property
     def solid(self) -> MassProperties | None:

@@ -13,22 +13,17 @@ def mjcf_setting(element: Element, attribute: str) -> Setting | None:
     """
     if attribute in element.attributes or element.tag in NO_DEFAULTS:
         return element.setting(attribute)
-    name, place = element.attributes.get("class"), element.parent
-    while name is None and place is not None:
-        name, place = place.attributes.get("childclass"), place.parent
-    root = element
-    while root.parent is not None:
-        root = root.parent
+    *places, root = element.around
+    name = element.attributes.get("class", next((one.attributes["childclass"] for one in places if "childclass" in one.attributes), ""))
     classes = list(root.every("default"))
     sections = [one for one in classes if one.parent is root]
-    chosen = [one for one in classes if one.attributes.get("class") == name] if name else []
-    default: Element | None = next(reversed(chosen or sections), None)
-    while default is not None and default.tag == "default":
+    chosen = [one for one in classes if name and one.attributes.get("class") == name] or sections
+    applying = [one for last in chosen[-1:] for one in (last, *last.around) if one.tag == "default"]
+    earlier = sections[: sections.index(applying[-1])] if applying else []
+    for default in (*applying, *reversed(earlier)):
         for child in reversed(default.children):
             if child.tag == element.tag and attribute in child.attributes:
                 return child.setting(attribute)
-        earlier = sections[: next((number for number, section in enumerate(sections) if section is default), 0)]
-        default = earlier[-1] if earlier else default.parent
     return None
 
 

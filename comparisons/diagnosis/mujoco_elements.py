@@ -44,7 +44,4 @@ def children_of(body: Element, *tags: str) -> list[Element]:
 
 def owner_of(element: Element) -> Element | None:
     """The body, or link, that an element is part of, also if it is within frames."""
-    place = element.parent
-    while place is not None and place.tag not in ("body", "worldbody", "link"):
-        place = place.parent
-    return place
+    return next((one for one in element.around if one.tag in ("body", "worldbody", "link")), None)

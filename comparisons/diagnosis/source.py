@@ -53,6 +53,13 @@ class Element:
                 yield child
             yield from child.every(*tags)
 
+    @property
+    def around(self) -> Iterator["Element"]:
+        """The elements that it is within, from the inside outwards."""
+        if self.parent is not None:
+            yield self.parent
+            yield from self.parent.around
+
     def setting(self, attribute: str) -> Setting | None:
         """An attribute of it, if it is written there."""
         value = self.attributes.get(attribute)

@@ -44,7 +44,7 @@ class MuJoCoAlone:
     Attributes:
         head: The number of the body in the file's model.
         group: The numbers of what is welded to it, its own first.
-        geoms: The numbers of their geometries.
+        geoms: The numbers of their geometries, in which order the model alone has them too.
         names: The names of all geometries of the file.
         surface: The number of what it lands on; None for nothing.
         others: The numbers of what else it collides with and may land on, unless what it lands on was named.

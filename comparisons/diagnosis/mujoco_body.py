@@ -158,9 +158,8 @@ class MuJoCoBody(LooseBody):
         unmodelled = {"frictionloss": self._model.dof_frictionloss.any(), "density": option.density, "viscosity": option.viscosity}
         inside = 0.0 if surface is None or alone.names[surface] == ADDED else self._start_inside()
         is_beside = surface is not None and file.model.geom_type[surface] != PLANE and math.isinf(file.height_above(surface, alone.geoms))
-        start = ["a start beside or below the surface"] * is_beside + [f"a start {inside:.3g} m inside the surface"] * (
-            inside > DEEP * self._model.stat.extent
-        )
+        start = ["a start beside or below the surface"] * is_beside
+        start += [f"a start {inside:.3g} m inside the surface"] * bool(inside > DEEP * self._model.stat.extent)
         tilted = [f"a gravity {off:.3g}° from the inward normal of the surface"] * (off > LEVEL)
         every = {friction_of(one) for one in self._touching.values()}
         frictions = (0.0, 0.0) if touching is None else next(iter(every)) if len(every) == 1 else (math.nan, math.nan)
@@ -207,7 +206,7 @@ class MuJoCoBody(LooseBody):
     def _parts(self) -> Sequence[Part]:
         """The geometries as shapes, relative to the centre of mass."""
         data, pairs, found = self._at_rest, self._alone.pairs, []
-        for number, geom in enumerate(self._own):
+        for number, geom in enumerate(self._alone.geoms):
             shape, shift, turned = shape_of(self._model, number)
             turn = quaternion(data.geom_xmat[number])
             position = data.geom_xpos[number] - self._offset + rotate(turn, shift)
@@ -218,16 +217,11 @@ class MuJoCoBody(LooseBody):
     def _lowest(self) -> list[int]:
         """The geometries that touch a level surface first in the pose of the file."""
         heights = {}
-        for geom, part in zip(self._own, self._parts, strict=True):
+        for geom, part in zip(self._alone.geoms, self._parts, strict=True):
             if geom in self._alone.pairs:
                 heights[geom] = lowest_of([part], self._pose) - _margin(self._alone.in_force_of(geom))
         tolerance = SAME_HEIGHT * self._model.stat.extent
         return [geom for geom, height in heights.items() if height <= min(heights.values()) + tolerance]
-
-    @property
-    def _own(self) -> list[int]:
-        """The numbers of the geometries in the file, in the order of the model alone."""
-        return [self._alone.geoms[int(self._model.geom(number).name.split()[1])] for number in range(self._model.ngeom)]
 
     def _rest_depth(self) -> float:
         """The depth of a body that rests on one point, or on several that share its weight, below the surface [m]; NaN of others."""

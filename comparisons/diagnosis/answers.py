@@ -19,8 +19,8 @@ REBOUND, COEFFICIENT = "rebound / impact speed", "coefficient of the contact"
 """The quantities that have targets."""
 DECAY_TIME, KEPT = "1/e time", "fraction kept in 1 s"
 """The quantities of a decay."""
-OF_FALLS, OF_SPINS = ("damping", "armature", "gravcomp"), ("damping", "armature")
-"""Settings by which the exact solution with the settings in force differs from that without them."""
+OF_WEIGHT = ("fall", "slide")
+"""Questions whose exact solution depends on the weight."""
 
 
 class Remedy(NamedTuple):
@@ -115,9 +115,7 @@ class Answer:
         return self.measured
 
 
-def judged(
-    body: LooseBody, answer: Answer, dts: Sequence[float], values: Sequence[float], exact: Sequence[float], acting: Sequence[str] = OF_SPINS
-) -> Answer:
+def judged(body: LooseBody, answer: Answer, dts: Sequence[float], values: Sequence[float], exact: Sequence[float]) -> Answer:
     """An answer with a value at each time step: findings if settings, time step or engine change it by more than 1 %.
 
     Args:
@@ -126,11 +124,11 @@ def judged(
         dts: Time steps [s].
         values: The value at each.
         exact: The exact value with the settings in force, at each.
-        acting: The settings that may act on it.
     """
     unknown, causes, free = body.facts.unknown, body.causes.get(answer.question, ()), answer.physical
-    is_acting = {"damping": any(body.facts.falls), "armature": body.facts.armature, "gravcomp": body.facts.lifted}
-    acting = tuple(name for name in acting if is_acting[name])
+    is_acting = {"damping": any(body.facts.falls), "armature": body.facts.armature}
+    is_acting["gravcomp"] = body.facts.lifted and answer.question in OF_WEIGHT
+    acting = tuple(name for name, acts in is_acting.items() if acts)
     if unknown:
         scale = 100.0 if answer.unit == "%" else abs(free) if math.isfinite(free) else 0.0
         differs = bool(abs(values[0] - free) > NOTEWORTHY * scale)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import DECAY_TIME, KEPT, NOTEWORTHY, OF_FALLS, Answer, judged, vector_text
+from dropspin.comparisons.diagnosis.answers import DECAY_TIME, KEPT, NOTEWORTHY, Answer, judged, vector_text
 from dropspin.comparisons.diagnosis.geometries import DIRECTIONS
 from dropspin.comparisons.diagnosis.loose_body import STILL, LooseBody, time_of_decay
 from dropspin.comparisons.engines.base import Diverged
@@ -38,7 +38,7 @@ def fall(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         fallen.append(start[1] - end[1])
         exact.append(facts.fallen(steps * dt))
     free = 0.5 * facts.gravity * (round(FALL / dts[0]) * dts[0]) ** 2
-    answers = [judged(body, Answer("fall", "distance in 1 s", "m", physical=free), dts, fallen, exact, OF_FALLS)]
+    answers = [judged(body, Answer("fall", "distance in 1 s", "m", physical=free), dts, fallen, exact)]
     if any(facts.falls) and not facts.unknown:
         speed = terminal_speed(facts.gravity * (1.0 - facts.lifted), facts.mass, *facts.falls)
         answers.append(Answer("fall", "terminal speed", "m/s", in_force=speed, physical=math.inf))

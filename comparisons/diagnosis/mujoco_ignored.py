@@ -55,11 +55,10 @@ def ignored(text: BodyText, in_force: MassProperties, *, raised: bool, condim: i
             yield _changed(text, "inertia", f"{made}: moments {digits(has.tolist())} kg m²")
     yield from _meshes(text)
     yield from _visual(text)
+    unused = [name for name, (place, least, most) in FURTHER.items() if condim < least and _friction(text, place) > most]
     if condim == 1 and "friction" in settings:
         yield "friction", settings["friction"], "not used: condim is 1"
-    elif condim and (
-        unused := [name for name, (place, least, most) in FURTHER.items() if condim < least and _friction(text, place) > most]
-    ):
+    elif condim and unused:
         needed = " and ".join(f"{name} friction needs condim {FURTHER[name][1]}" for name in unused)
         yield "friction", settings["friction"], f"used in part: {needed}, and condim is {condim}"
     if text.file.is_urdf:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import KEPT, MOVES, OF_FALLS, TIPS, UNTURNED, WATCHED, Answer, judged
+from dropspin.comparisons.diagnosis.answers import KEPT, MOVES, TIPS, UNTURNED, WATCHED, Answer, judged
 from dropspin.comparisons.diagnosis.landing import is_at_rest, tilt
 from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
@@ -52,7 +52,7 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     if not along or not across:
         return [replace(blank, direction=way, detail=TIPS) for way in WAYS]
     ways = zip(WAYS, (along, across), strict=True)
-    answers = [judged(body, replace(blank, direction=way), dts, stops, [exact] * len(dts), OF_FALLS) for way, stops in ways]
+    answers = [judged(body, replace(blank, direction=way), dts, stops, [exact] * len(dts)) for way, stops in ways]
     if not math.isnan(facts.friction_across):
         turned = replace(blank, direction=WAYS[1], physical=math.nan)
         return [answers[0], replace(turned, detail=long) if least < longest else replace(turned, measured=across[0])]

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import combinations, pairwise
+from itertools import chain, combinations, pairwise, starmap
 from pathlib import Path
 
 import numpy as np
@@ -149,22 +149,12 @@ def log_compare(
     measured, dt = recorded(starts), time_step(starts)
     given = {entry.label: _given(flights, starts, dt, fit, entry.label) for entry in entries}
     found, left_out = of_each_engine(entries, partial(_errors, header, given, measured), on_progress, resources, jobs)
-    pairs = [pair for kind in COMPARED for pair in _pairs(kind, found)]
-    return LogComparison(
-        len(starts),
-        body_length(header.body),
-        dt,
-        tuple(error for label, by_what in found.items() for error in _rows(label, by_what)),
-        tuple(pairs),
-        {
-            kind.quantity: groups(
-                list(found), {frozenset((one.first, one.second)) for one in pairs if one.quantity == kind.quantity and one.differs}
-            )
-            for kind in COMPARED
-        },
-        tuple(share for label, by_what in found.items() for share in _shares(label, by_what)),
-        left_out,
-    )
+    rows, shares = chain.from_iterable(starmap(_rows, found.items())), chain.from_iterable(starmap(_shares, found.items()))
+    pairs = {kind.quantity: _pairs(kind, found) for kind in COMPARED}
+    apart = {quantity: {frozenset((one.first, one.second)) for one in some if one.differs} for quantity, some in pairs.items()}
+    alike = {quantity: groups(list(found), some) for quantity, some in apart.items()}
+    every = tuple(chain(*pairs.values()))
+    return LogComparison(len(starts), body_length(header.body), dt, tuple(rows), every, alike, tuple(shares), left_out)
 
 
 def _given(flights: Flights, starts: Sequence[Start], dt: float, fit: LogFit | None, label: str) -> dict[str, Launches]:
@@ -174,8 +164,7 @@ def _given(flights: Flights, starts: Sequence[Start], dt: float, fit: LogFit | N
     drawn = np.concatenate([start.drawn(random, DRAWS) for start in starts])
     found["drawn starts"] = launches(header, [start for start in starts for _ in range(DRAWS)], drawn, dt)
     centre = np.array(header.tracked_point) - flights.moving.values[OFFSET]
-    keys = {"center_of_mass": tuple(centre.tolist()), "inertia": header.body.inertia_tensor.tolist()}
-    header = header.model_copy(update={"body": type(header.body).model_validate(header.body.model_dump() | keys)})
+    header = header.corrected({"body.center_of_mass": centre.tolist(), "body.inertia": header.body.inertia_tensor.tolist()})
     moved = replace(flights, log=replace(flights.log, header=header))
     states = np.array([start.state for start in usable(moved)])
     found["centre of mass"] = improved = launches(header, starts, states, dt)

@@ -68,16 +68,9 @@ def scene_of(header: Header) -> Scenario:
     """
     if header.floor is None:
         raise DropspinError("the recording's header has no [floor]; give restitution and friction, as far as they are known.")
-    return from_mapping(
-        {
-            "name": "toss",
-            "duration": 1.0,
-            "body": header.body.model_dump(),
-            "start": {"position": (0.0, 2.0 * header.body.size, 0.0)},
-            "gravity": {"acceleration": (0.0, -header.gravity, 0.0)},
-            "floor": header.floor.model_dump(),
-        }
-    )
+    content = {"name": "toss", "duration": 1.0, "body": header.body.model_dump(), "floor": header.floor.model_dump()}
+    start, gravity = {"position": (0.0, 2.0 * header.body.size, 0.0)}, {"acceleration": header.acceleration.tolist()}
+    return from_mapping({**content, "start": start, "gravity": gravity})
 
 
 def measured_scene(flights: Flights) -> Scenario | None:

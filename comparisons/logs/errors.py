@@ -18,6 +18,10 @@ RESTS_FOR = 0.05
 """Time for which it does at least [s]."""
 
 
+TIMES = ("impact", "+0.1 s", "mean", "end")
+"""When poses are compared."""
+
+
 class Kind(NamedTuple):
     """A kind of error: the quantity, when it is compared, and the unit; `1` for the length of the body or the energy at the first frame."""
 
@@ -27,11 +31,8 @@ class Kind(NamedTuple):
 
 
 KINDS = (
-    *(
-        Kind(quantity, at, unit)
-        for quantity, unit in (("position", "1"), ("orientation", "rad"))
-        for at in ("impact", "+0.1 s", "mean", "end")
-    ),
+    *(Kind("position", at, "1") for at in TIMES),
+    *(Kind("orientation", at, "rad") for at in TIMES),
     Kind("energy", "mean", "1"),
     Kind("rest time", "end", "s"),
     Kind("resting face", "end", "1"),

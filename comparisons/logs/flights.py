@@ -105,15 +105,13 @@ class Flights:
         """The state at the end of each flight, by the header's gravity and centre of mass."""
         header = self.log.header
         known = np.concatenate([header.acceleration, header.tracked_from_centre])
-        each = zip(self.found, self.rotations, self.moving.weights, self.turning.weights, strict=True)
+        each = zip(self.rotations, self.moving.weights, self.turning.weights, strict=True)
         position, orientation = self.moving.noise, self.turning.noise
-        return [
-            _start(flight, known, rotor, position.of_weight(moved), orientation.of_weight(turned)) for flight, rotor, moved, turned in each
-        ]
+        return [_start(rotor, known, position.of_weight(moved), orientation.of_weight(turned)) for rotor, moved, turned in each]
 
 
-def _start(flight: Flight, known: Array, rotor: Rotation, position_noise: Noise, orientation_noise: Noise) -> Start:
-    end = np.array([flight.duration])
+def _start(rotor: Rotation, known: Array, position_noise: Noise, orientation_noise: Noise) -> Start:
+    flight, end = rotor.flight, np.array([rotor.flight.duration])
     samples = departures(flight, known)
     moved, moved_covariance = end_of(samples, np.concatenate([np.zeros((3, 3)), np.eye(3)], axis=1), position_noise)
     moved[:3] += 0.5 * known[ACCELERATION] * end**2

@@ -174,10 +174,8 @@ def _refined(axis: Array, tried: Array, lower: Array, upper: Array) -> Array | N
     if is_bound and from_below:
         core_low, core_high = float(axis[max(0, int(np.searchsorted(axis, low)) - 1)]), float(np.quantile(lower, 1.0 - CORE))
     elif is_bound:
-        core_low, core_high = (
-            float(np.quantile(upper, CORE)),
-            float(axis[min(len(axis) - 1, int(np.searchsorted(axis, high, side="right")))]),
-        )
+        core_low = float(np.quantile(upper, CORE))
+        core_high = float(axis[min(len(axis) - 1, int(np.searchsorted(axis, high, side="right")))])
     step = float(np.diff(axis)[max(0, np.searchsorted(axis, core_low) - 1) : np.searchsorted(axis, core_high) + 1].max())
     encloses = (axis[0] < low or axis[0] == tried[0]) and (high < axis[-1] or axis[-1] == tried[-1])
     if encloses and step <= (FINEST_BOUND if is_bound else max(FINE_ENOUGH * (core_high - core_low), FINEST)):

@@ -68,9 +68,8 @@ def of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
         some = [replace(flight, toss=_read_as(flight.toss, log.header, rolled, inverse)) for flight in tried]
         readings.append(_Explanation(cause, *(_left_by(some, inertia) if some else (turning, 0.0)), level_share(read)[0]))
     can_be_explained = bool(tried) and EXPLAINED * turning > LEAST_LEFT * flights.turning.noise.white
-    orders = [
-        _Explanation(cause, *_left_by(tried, exchanged), level) for exchanged, cause in (orders_of_axes(log) if can_be_explained else ())
-    ]
+    other_axes = orders_of_axes(log) if can_be_explained else ()
+    orders = [_Explanation(cause, *_left_by(tried, exchanged), level) for exchanged, cause in other_axes]
     found = [one for one in (*readings, *orders) if one.turning < EXPLAINED * turning and not one.level < NEARLY * level]
     if not found and count >= 3 and level < 0.7:
         found = [one for one in readings if one.level > NEARLY and one.turning < 2.0 * turning]

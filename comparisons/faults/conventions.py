@@ -1,6 +1,7 @@
 """Faults of conventions: frames, orders, signs and units of states, and parts of the start that are not set."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -29,9 +30,9 @@ def _convention(part: slice, fault: str, expected: str, wrong: Change, right: Ch
         wrong: Function from the part in the correct convention to the part in the faulty one.
         right: The inverse function.
     """
-    changes = [(changed_part(part, wrong), changed_part(part, right))]
+    changes: list[tuple[Reported, Reported]] = [(changed_part(part, wrong), changed_part(part, right))]
     if part == ORIENTATION:
-        changes.append((_with_spin(wrong), _with_spin(right)))
+        changes.append((partial(_with_spin, wrong), partial(_with_spin, right)))
     for reported, inverse in changes:
         simulated, about = changed_start(inverse), str(part)
         yield FaultModel(f"{fault}; {expected}", reported=reported, about=about)
@@ -39,16 +40,12 @@ def _convention(part: slice, fault: str, expected: str, wrong: Change, right: Ch
         yield FaultModel(f"{fault}, both set and read; {expected}", simulated, reported, about=about)
 
 
-def _with_spin(change: Change) -> Reported:
+def _with_spin(change: Change, states: Array) -> Array:
     """States with a changed orientation, by which the angular velocity is converted from the body frame too."""
-
-    def changed(states: Array) -> Array:
-        spin = unrotate(states[:, ORIENTATION], states[:, SPIN])
-        states = changed_part(ORIENTATION, change)(states)
-        states[:, SPIN] = rotate(states[:, ORIENTATION], spin)
-        return states
-
-    return changed
+    spin = unrotate(states[:, ORIENTATION], states[:, SPIN])
+    states = changed_part(ORIENTATION, change)(states)
+    states[:, SPIN] = rotate(states[:, ORIENTATION], spin)
+    return states
 
 
 def _rolled(by: int) -> Change:
@@ -63,19 +60,15 @@ def _inverted(_: Array, orientation: Array) -> Array:
     return conjugate(orientation)
 
 
-def _z_up(sign: float, but: slice | None = None) -> Reported:
+def _z_up(sign: float, but: slice | None, states: Array) -> Array:
     """States in a frame with z up, (x, y, z) reported as (x, -z, y) or (x, z, -y), except for one part of them."""
-
-    def turned(states: Array) -> Array:
-        states = states.copy()
-        for part in (POSITION, VELOCITY, SPIN):
-            if part != but:
-                states[:, part] = states[:, part][:, [0, 2, 1]] * [1.0, -sign, sign]
-        if but != ORIENTATION:
-            states[:, ORIENTATION] = multiply(rotation_about(np.array([1.0, 0.0, 0.0]), np.array(sign * np.pi / 2)), states[:, ORIENTATION])
-        return states
-
-    return turned
+    states = states.copy()
+    for part in (POSITION, VELOCITY, SPIN):
+        if part != but:
+            states[:, part] = states[:, part][:, [0, 2, 1]] * [1.0, -sign, sign]
+    if but != ORIENTATION:
+        states[:, ORIENTATION] = multiply(rotation_about(np.array([1.0, 0.0, 0.0]), np.array(sign * np.pi / 2)), states[:, ORIENTATION])
+    return states
 
 
 def _left_handed(states: Array) -> Array:
@@ -110,7 +103,7 @@ CONVENTIONS = (
         about="frame",
     ),
     *(
-        FaultModel(f"states appear to be in a frame with z up{but}; y is up", reported=_z_up(sign, part), about="frame")
+        FaultModel(f"states appear to be in a frame with z up{but}; y is up", reported=partial(_z_up, sign, part), about="frame")
         for sign in (1.0, -1.0)
         for part, but in ((None, ""), (ORIENTATION, ", except for the orientation"), (SPIN, ", except for the angular velocity"))
     ),

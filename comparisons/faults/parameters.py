@@ -1,6 +1,7 @@
 """Faults of parameters: of gravity, damping, mass and inertia, which show in flight, and of floor and shape, which show at an impact."""
 
 from collections.abc import Callable
+from functools import partial
 from itertools import permutations
 
 import numpy as np
@@ -22,14 +23,10 @@ MULTIPLIES = "an engine that multiplies the values of two bodies needs 1 for the
 AVERAGES = "an engine that averages the values of two bodies needs the scene's value on both"
 
 
-def _gravity(change: Callable[[Array, float], Array]) -> Simulated:
+def _with_gravity(change: Callable[[Array, float], Array], scene: Scenario) -> Scenario:
     """A change of gravity, by a function of the acceleration and of the mass."""
-
-    def changed(scene: Scenario) -> Scenario:
-        acceleration = tuple(float(value) for value in change(scene.acceleration, scene.body.mass))
-        return scene.model_copy(update={"gravity": Gravity(acceleration=acceleration)})
-
-    return changed
+    acceleration = tuple(float(value) for value in change(scene.acceleration, scene.body.mass))
+    return scene.model_copy(update={"gravity": Gravity(acceleration=acceleration)})
 
 
 def _angular_like_linear(scene: Scenario) -> Scenario:
@@ -45,14 +42,10 @@ def _without_products(scene: Scenario) -> Scenario:
     return with_values(scene, "body", inertia=scene.body.moments)
 
 
-def _permuted_moments(order: tuple[int, ...]) -> Simulated:
+def _permuted_moments(order: tuple[int, ...], scene: Scenario) -> Scenario:
     """The principal moments about other principal axes."""
-
-    def permuted(scene: Scenario) -> Scenario:
-        moments, axes = principal_axes(scene.body.inertia_tensor)
-        return with_values(scene, "body", inertia=(axes * moments[list(order)] @ axes.T).tolist())
-
-    return permuted
+    moments, axes = principal_axes(scene.body.inertia_tensor)
+    return with_values(scene, "body", inertia=(axes * moments[list(order)] @ axes.T).tolist())
 
 
 def _as_a_ball(scene: Scenario) -> Scenario:
@@ -68,45 +61,40 @@ def _friction(change: Callable[[float], float]) -> Simulated:
     return changed_table("floor", friction=lambda mu: mu if isinstance(mu, str) else change(mu))
 
 
-def _permuted_extents(order: tuple[int, ...]) -> Simulated:
-    def permuted(scene: Scenario) -> Scenario:
-        if not isinstance(scene.body, Box | Ellipsoid):
-            return scene
-        extents = [scene.body.half_extents[axis] for axis in order]
-        return with_values(scene, "body", half_extents=extents, inertia=in_numbers(scene.body.inertia_tensor))
-
-    return permuted
+def _permuted_extents(order: tuple[int, ...], scene: Scenario) -> Scenario:
+    if not isinstance(scene.body, Box | Ellipsoid):
+        return scene
+    extents = [scene.body.half_extents[axis] for axis in order]
+    return with_values(scene, "body", half_extents=extents, inertia=in_numbers(scene.body.inertia_tensor))
 
 
-def _scaled(size: str, by: float) -> Simulated:
+def _scaled(size: str, by: float, scene: Scenario) -> Scenario:
     """The radius or the half extents of bodies times a factor, with the same moments of inertia."""
-
-    def scaled(scene: Scenario) -> Scenario:
-        if scene.floor is None or size not in type(scene.body).model_fields:
-            return scene
-        larger = {size: lambda values: np.multiply(values, by).tolist()}
-        return with_values(scene, "body", inertia=in_numbers(scene.body.inertia_tensor), **larger)
-
-    return scaled
+    if scene.floor is None or size not in type(scene.body).model_fields:
+        return scene
+    larger = {size: lambda values: np.multiply(values, by).tolist()}
+    return with_values(scene, "body", inertia=in_numbers(scene.body.inertia_tensor), **larger)
 
 
+GRAVITY: dict[str, Callable[[Array, float], Array]] = {
+    "gravity is omitted": lambda g, _: 0.0 * g,
+    "gravity has the opposite sign; the scene gives an acceleration, y up": lambda g, _: -g,
+    "gravity is 9.81 m/s² along -y for every scene": lambda g, _: 9.81 * DOWN,
+    "gravity is 9.81 m/s² along -y for every scene that has gravity": lambda g, _: 9.81 * DOWN * g.any(),
+    "gravity acts along y only; it is a vector": lambda g, _: g * UP,
+    "gravity is 9.81 m/s² along -z for every scene; y is up": lambda g, _: 9.81 * BACK,
+    "gravity acts along -z; y is up": lambda g, _: np.linalg.norm(g) * BACK,
+    "gravity acts along -y with the scene's magnitude; it is a vector": lambda g, _: np.linalg.norm(g) * DOWN,
+    "gravity's y and z appear to be swapped; y is up": lambda g, _: g[[0, 2, 1]],
+    "gravity appears to be given in a frame with z up; y is up": lambda g, _: g[[0, 2, 1]] * [1, 1, -1],
+    "gravity appears to be rotated into a frame with z up; y is up": lambda g, _: g[[0, 2, 1]] * [1, -1, 1],
+    "gravity is multiplied by the mass; it is an acceleration, not a force": lambda g, mass: g * mass,
+    "gravity is divided by the mass; it is an acceleration, not a force": lambda g, mass: g * mass**-1.0,
+    "gravity acts twice": lambda g, _: 2.0 * g,
+}
+"""By the message of a fault: the acceleration that is simulated, from that of the scene and the mass."""
 PARAMETERS: dict[str, dict[str, Simulated]] = {
-    "gravity": {
-        "gravity is omitted": _gravity(lambda g, _: 0.0 * g),
-        "gravity has the opposite sign; the scene gives an acceleration, y up": _gravity(lambda g, _: -g),
-        "gravity is 9.81 m/s² along -y for every scene": _gravity(lambda g, _: 9.81 * DOWN),
-        "gravity is 9.81 m/s² along -y for every scene that has gravity": _gravity(lambda g, _: 9.81 * DOWN * g.any()),
-        "gravity acts along y only; it is a vector": _gravity(lambda g, _: g * UP),
-        "gravity is 9.81 m/s² along -z for every scene; y is up": _gravity(lambda g, _: 9.81 * BACK),
-        "gravity acts along -z; y is up": _gravity(lambda g, _: np.linalg.norm(g) * BACK),
-        "gravity acts along -y with the scene's magnitude; it is a vector": _gravity(lambda g, _: np.linalg.norm(g) * DOWN),
-        "gravity's y and z appear to be swapped; y is up": _gravity(lambda g, _: g[[0, 2, 1]]),
-        "gravity appears to be given in a frame with z up; y is up": _gravity(lambda g, _: g[[0, 2, 1]] * [1, 1, -1]),
-        "gravity appears to be rotated into a frame with z up; y is up": _gravity(lambda g, _: g[[0, 2, 1]] * [1, -1, 1]),
-        "gravity is multiplied by the mass; it is an acceleration, not a force": _gravity(lambda g, mass: g * mass),
-        "gravity is divided by the mass; it is an acceleration, not a force": _gravity(lambda g, mass: g * mass**-1.0),
-        "gravity acts twice": _gravity(lambda g, _: 2.0 * g),
-    },
+    "gravity": {message: partial(_with_gravity, change) for message, change in GRAVITY.items()},
     "damping": {
         "damping is omitted": lambda scene: scene.model_copy(update={"damping": None}),
         "angular damping is omitted": changed_table("damping", angular=0.0),
@@ -116,7 +104,10 @@ PARAMETERS: dict[str, dict[str, Simulated]] = {
     "mass": {"mass is 1 kg for every scene": changed_table("body", mass=1.0)},
     "inertia": {
         "angular velocity stays constant, as without the gyroscopic term or with the inertia of a ball": _as_a_ball,
-        **{f"the moments of inertia appear to be permuted to ({named})": _permuted_moments(order) for order, named in ORDERS.items()},
+        **{
+            f"the moments of inertia appear to be permuted to ({named})": partial(_permuted_moments, order)
+            for order, named in ORDERS.items()
+        },
         "products of inertia are omitted: the body's own axes are not principal axes": _without_products,
         "inertia is twice as large, relative to the mass": _scaled_inertia(lambda mass: 2.0),
         "inertia is half as large, relative to the mass": _scaled_inertia(lambda mass: 0.5),
@@ -142,11 +133,11 @@ PARAMETERS: dict[str, dict[str, Simulated]] = {
         f"friction appears to be halved; {AVERAGES}": _friction(lambda mu: mu / 2),
     },
     "size": {
-        **{f"the half extents appear to be permuted to ({named})": _permuted_extents(order) for order, named in ORDERS.items()},
-        "the radius is half as large as it should be: is a radius read as a diameter?": _scaled("radius", 0.5),
-        "the radius is twice as large as it should be: is a diameter read as a radius?": _scaled("radius", 2.0),
-        "the body is half as large as it should be: are half extents read as extents?": _scaled("half_extents", 0.5),
-        "the body is twice as large as it should be: are extents read as half extents?": _scaled("half_extents", 2.0),
+        **{f"the half extents appear to be permuted to ({named})": partial(_permuted_extents, order) for order, named in ORDERS.items()},
+        "the radius is half as large as it should be: is a radius read as a diameter?": partial(_scaled, "radius", 0.5),
+        "the radius is twice as large as it should be: is a diameter read as a radius?": partial(_scaled, "radius", 2.0),
+        "the body is half as large as it should be: are half extents read as extents?": partial(_scaled, "half_extents", 0.5),
+        "the body is twice as large as it should be: are extents read as half extents?": partial(_scaled, "half_extents", 2.0),
     },
 }
 """By what is wrong: the message of each fault, and the scene that is simulated."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from dropspin.comparisons.faults.fault_model import FaultModel, Reported, Simulated, changed_part, changed_start
+from dropspin.comparisons.faults.fault_model import FaultModel, Reported, changed_part, changed_start
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.bodies import Body, Capsule, Cylinder, Ellipsoid, Mesh, OnAxis, Shape
 from dropspin.scenarios.bodies.inertia import in_numbers
@@ -25,17 +25,13 @@ Instead = Callable[[Any], Mapping[str, Any]]
 """From a body to the keys of the one that is built instead."""
 
 
-def _built_as(kind: type[Shape], instead: Instead, inertia: str = "") -> Simulated:
-    """Scenes with bodies of a kind built otherwise; with their own inertia, or with a distribution of the mass of what is built."""
-
-    def simulated(scene: Scenario) -> Scenario:
-        body = scene.body
-        if not isinstance(body, kind):
-            return scene
-        content = {"mass": body.mass, "inertia": inertia or body.inertia_tensor.tolist(), "center_of_mass": body.centre.tolist()}
-        return scene.model_copy(update={"body": BODY.validate_python(content | dict(instead(body)))})
-
-    return simulated
+def _built_as(kind: type[Shape], instead: Instead, inertia: str, scene: Scenario) -> Scenario:
+    """The scene with a body of a kind built otherwise; with its own inertia, or with a distribution of the mass of what is built."""
+    body = scene.body
+    if not isinstance(body, kind):
+        return scene
+    content = {"mass": body.mass, "inertia": inertia or body.inertia_tensor.tolist(), "center_of_mass": body.centre.tolist()}
+    return scene.model_copy(update={"body": BODY.validate_python(content | dict(instead(body)))})
 
 
 def _lengths(half_length: Callable[[float, float], float], shape: str = "") -> Instead:
@@ -92,7 +88,7 @@ def _along(number: int) -> Iterator[FaultModel]:
 def _otherwise() -> Iterator[FaultModel]:
     for kind, faults in WRONG.items():
         for (message, instead), inertia in product(faults.items(), ("", "solid")):
-            yield FaultModel(message, _built_as(kind, instead, inertia), about="shape")
+            yield FaultModel(message, partial(_built_as, kind, instead, inertia), about="shape")
 
 
 SHAPE_FAULTS = (*_otherwise(), *_along(2), *_along(0))

@@ -25,10 +25,12 @@ def connected(scheduler: str) -> Iterator[Any]:
         EngineMissing: Dask is not installed.
         DropspinError: The address is not valid, or the scheduler does not answer, is lost or loses its workers during the work.
     """
+
+    def failed(reason: str) -> DropspinError:
+        return DropspinError(f"--scheduler {scheduler}: {reason}.")
+
     if not re.fullmatch(r"[a-z]+://[^\s:]+:\d+", scheduler):
-        raise DropspinError(
-            f"--scheduler {scheduler}: not a valid address; give the one that dask scheduler prints when it starts, such as tcp://host:8786."
-        )
+        raise failed("not a valid address; give the one that dask scheduler prints when it starts, such as tcp://host:8786")
     if find_spec("distributed") is None:
         raise EngineMissing(f"--scheduler needs Dask, which is not installed: {install_extra('cluster')}.")
     from distributed import Client, KilledWorker, Security
@@ -45,21 +47,18 @@ def connected(scheduler: str) -> Iterator[Any]:
     except Exception as error:  # whatever distributed makes of the answer of another program
         is_connected = isinstance(error, TimeoutError) or not isinstance(error, OSError | ValueError)
         reason = "the program at this address does not answer as a scheduler" if is_connected else f"no scheduler answers ({error})"
-        raise DropspinError(f"--scheduler {scheduler}: {reason}; start one with: dask scheduler.") from None
+        raise failed(f"{reason}; start one with: dask scheduler") from None
     client = Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)  # type: ignore[no-untyped-call]
     with client, client.as_current():
         end = time.monotonic() + WORKER_TIMEOUT
         while not client.nthreads():  # type: ignore[no-untyped-call]
             if time.monotonic() > end:
-                reason = f"no worker has connected for {WORKER_TIMEOUT:g} s; start one with: dask worker {scheduler}"
-                raise DropspinError(f"--scheduler {scheduler}: {reason}.")
+                raise failed(f"no worker has connected for {WORKER_TIMEOUT:g} s; start one with: dask worker {scheduler}")
             time.sleep(POLL)
         try:
             yield client
         except CancelledError:
-            raise DropspinError(
-                f"--scheduler {scheduler}: the connection was lost; what is finished is kept, and the same command continues"
-                ", that of a sweep with --resume."
-            ) from None
+            kept = "what is finished is kept, and the same command continues, that of a sweep with --resume"
+            raise failed(f"the connection was lost; {kept}") from None
         except KilledWorker as error:
-            raise DropspinError(f"--scheduler {scheduler}: workers were lost again and again at the same work ({error}).") from None
+            raise failed(f"workers were lost again and again at the same work ({error})") from None

@@ -157,10 +157,9 @@ def _of_states(scene: Scenario, truth: Truth | None, motion: Trajectory) -> Iter
             f"{_listed(state[POSITION])} m with velocity {_listed(state[VELOCITY])} m/s and angular velocity {_listed(state[SPIN])} rad/s"
             for state in (found[0], scene.initial_state)
         )
-        turned = (
-            f", turned by {float(angle_between_orientations(found[:1, ORIENTATION], scene.initial_state[None, ORIENTATION])[0]):.3g} rad"
-        )
-        yield f"it begins at {own}, the scene at {other}{turned}; give the motion of this scene, or a scene with this start"
+        [turned] = angle_between_orientations(found[:1, ORIENTATION], scene.initial_state[None, ORIENTATION])
+        begins = f"it begins at {own}, the scene at {other}, turned by {turned:.3g} rad"
+        yield f"{begins}; give the motion of this scene, or a scene with this start"
 
 
 def _speed(scene: Scenario, exact: Array) -> float:

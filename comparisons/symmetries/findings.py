@@ -15,12 +15,12 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, PlainValidator
 
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS, Verdict
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, Judgement, Verdict
 from dropspin.comparisons.measuring.differences import differences
 from dropspin.comparisons.measuring.symmetries import BITWISE, kind_of
 from dropspin.comparisons.measuring.tolerances import EPS_PER_STEP, FEW_DRAWS, MATTERS
 from dropspin.comparisons.results.results import Results
-from dropspin.comparisons.results.table import Measurement, as_table
+from dropspin.comparisons.results.table import Case, Measurement, as_table
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.perturbed_starts import PERTURBATION
 from dropspin.scenarios import Scenario
@@ -150,17 +150,15 @@ def with_symmetries(results: Results, findings: Sequence[Finding], dt: float) ->
 def _row(finding: Finding, dt: float) -> Measurement:
     kind, bound = kind_of(finding.symmetry), 0.0 if finding.symmetry in BITWISE else MATTERS
     assert kind is not None
-    row = Measurement(
-        scene=finding.scene, engine=finding.engine, dt=dt, metric=finding.symmetry, unit="1", kind=kind, upper=bound, verdict="passed"
-    )
     if finding.status == "not run":
         assert finding.verdict
-        return replace(row, verdict=finding.verdict, reason=finding.reason)
-    fails = finding.status == "lost" or (finding.status == "nearly kept" and bound == 0.0)
-    differ = "the motions differ" if bound == 0.0 else "rounding does not explain the difference"
-    reason = {"kept": "", "rounding": "rounding explains the difference"}.get(
-        finding.status, f"{differ} from step {finding.step} on, at {finding.time:.4g} s"
-    )
-    # What perturbations explain is due to chance, and is of another size on another machine.
-    tolerance = max(MATTERS, BY_CHANCE * finding.difference * (finding.status == "rounding"))
-    return replace(row, value=finding.difference, tolerance=tolerance, verdict="failed" if fails else "passed", reason=reason)
+        judgement = Judgement(math.nan, finding.verdict, upper=bound, reason=finding.reason)
+    else:
+        fails = finding.status == "lost" or (finding.status == "nearly kept" and bound == 0.0)
+        differ = "the motions differ" if bound == 0.0 else "rounding does not explain the difference"
+        reason = f"{differ} from step {finding.step} on, at {finding.time:.4g} s"
+        reason = {"kept": "", "rounding": "rounding explains the difference"}.get(finding.status, reason)
+        # What perturbations explain is due to chance, and is of another size on another machine.
+        tolerance = max(MATTERS, BY_CHANCE * finding.difference * (finding.status == "rounding"))
+        judgement = Judgement(finding.difference, "failed" if fails else "passed", upper=bound, reason=reason, tolerance=tolerance)
+    return Case(finding.scene, finding.engine, dt).measurement(kind, finding.symmetry, "1", judgement)

@@ -126,9 +126,7 @@ def tradeoff(
         points, others, failures = _with_costs(compared, scene, sizes, processes, report)
         memory = _memory(entries, points, scene, sizes[-1], processes)
     measured = {point.engine for point in points}
-    without = {ladder.engine for ladder in ladders if not ladder.left_out} - measured
-    ladders = [replace(ladder, left_out=NO_COST, verdict="crashed") if ladder.engine in without else ladder for ladder in ladders]
-    ladders = [_with_failure(ladder, failures.get(ladder.engine)) for ladder in ladders]
+    ladders = [_with_failures(ladder, ladder.engine in measured, failures.get(ladder.engine)) for ladder in ladders]
     result = TradeOff(scene, chosen, points, tuple(ladders), sizes, memory, others)
     if not points:
         reasons = "; ".join(f"{label}: {why.removesuffix('.')}" for label, why in result.left_out.items())
@@ -136,8 +134,10 @@ def tradeoff(
     return result
 
 
-def _with_failure(ladder: Ladder, of_batches: Breakdown | None) -> Ladder:
-    """A ladder with the reason why batches have no cost, unless the engine has no batches; a breakdown is one of the engine."""
+def _with_failures(ladder: Ladder, has_cost: bool, of_batches: Breakdown | None) -> Ladder:
+    """A ladder with the reason why it or its batches have no cost, unless the engine has no batches; a breakdown is one of the engine."""
+    if not has_cost and not ladder.left_out:
+        ladder = replace(ladder, left_out=NO_COST, verdict="crashed")
     if of_batches is None or of_batches.verdict == "declined":
         return ladder
     return replace(ladder, no_batch_cost=of_batches.reason, verdict=ladder.verdict or of_batches.verdict)

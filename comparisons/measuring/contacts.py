@@ -78,7 +78,6 @@ def contact_residuals(scene: Scenario, states: Array, motions: Motions) -> Conta
         states: Shape (B, n, 13), or (n, 13) of one motion.
         motions: The motions.
     """
-    assert scene.floor is not None
     motion, steps = np.nonzero(np.atleast_2d(motions.states.touching))
     blocks = np.array_split(np.arange(len(steps)), 1 + len(steps) // AT_ONCE)
     parts = [_residuals(scene, states, motions, motion[block], steps[block]) for block in blocks]

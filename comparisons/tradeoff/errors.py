@@ -23,6 +23,7 @@ from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.start_phases import StartPhase, start_phases
 from dropspin.scenarios import Scenario, truth_for
+from dropspin.scenarios.truths import exact_solution
 
 DIVISIONS = (1, *(k * 2**j for j in range(22) for k in (2, 3)))
 """Numbers of steps per output interval, 1, 2, 3, 4, 6, 8, 12, …, each about 1.4 times the previous one."""
@@ -163,8 +164,7 @@ def _left_out(scene: Scenario, tried: Sequence[tuple[float, list[float]]], metri
 
 def _covered(scene: Scenario) -> float:
     """The largest distance of the exact motion from its start [m], at least the size of the body."""
-    truth = truth_for(scene)
-    assert truth is not None
+    truth = exact_solution(scene)
     position = truth(np.linspace(0.0, min(scene.duration, truth.horizon), ROWS_OF_MOTION)).position
     return max(scene.body.size, float(np.linalg.norm(position - position[0], axis=1).max()))
 

@@ -23,8 +23,8 @@ CENTRAL = 1e-9
 STOPPED = 1e-3  # m/s, of a ball that rolled at 1 m/s
 MARGINAL = 1.01
 """Ratio of the two levers up to which a body, such as a cube with a coefficient of friction of 1, is not said to tip."""
-LEANING = 1e-4
-"""Angle by which the lever of the weight about the leading edge is found [rad]."""
+LEANING = np.array([0.0, 0.01, 0.0101])
+"""Angles by which the lever of the weight about the leading edge is found [rad]: beyond that by which an uneven load tilts a body at rest."""
 WAYS = ("0°", "45°")
 """Directions of a slide, from an axis of the surface."""
 
@@ -86,11 +86,11 @@ def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direct
 
 def _is_tipped(facts: Facts, rest: Array, direction: Array) -> bool:
     """Whether friction turns a rigid body that slides in a direction over its leading edge: at first its weight has the shorter arm."""
-    turns = multiply(about(np.cross(UP, direction), np.array([0.0, LEANING])), rest[ORIENTATION])
-    states = np.zeros((2, 13))
-    states[:, ORIENTATION] = turns
-    height, leaning = -facts.lowest(states)  # of the centre of mass, which rises as the body leans
-    return facts.friction * height > MARGINAL * (leaning - height) / LEANING
+    states = np.zeros((len(LEANING), 13))
+    states[:, ORIENTATION] = multiply(about(np.cross(UP, direction), LEANING), rest[ORIENTATION])
+    height, leaning, further = -facts.lowest(states)  # of the centre of mass, which rises by the lever as the body leans, and falls
+    lever = (further - leaning) / (LEANING[2] - LEANING[1]) + LEANING[1] * leaning
+    return bool(facts.friction * height > MARGINAL * lever)
 
 
 def _stop(facts: Facts) -> float:

@@ -196,3 +196,10 @@ def test_tall_box_that_friction_turns_over_its_edge_has_no_stopping_distance(tmp
         world = FREE.format(f'<geom name="g" type="box" size=".1 .1 {height}" mass="1"/>')
         body = body_of(tmp_path, world, 'cone="elliptic" impratio="10"')
         assert [answer.detail == TIPS for answer in slide(body, ladder(body))] == [tips] * 2
+
+
+def test_body_that_an_uneven_load_tilts_at_rest_slides(tmp_path):
+    """By 0.5 mrad on a soft surface, backwards; µ times its height is 25 mm, the lever about its leading edge 250 mm."""
+    block = '<inertial pos="-.1 0 .005" mass="1" diaginertia=".01 .01 .01"/><geom type="box" size=".15 .1 .02"/>'
+    body = body_of(tmp_path, FREE.format(block))
+    assert [answer.detail for answer in slide(body, ladder(body))] == ["", ""]

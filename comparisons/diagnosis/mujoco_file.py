@@ -39,6 +39,8 @@ TURNED = 1e-6
 """Difference of |cos(angle / 2)| from 1 up to which two orientations are the same."""
 LONGEST_STEP = 0.1
 """The longest time step [s] in which the motions, of a second or less, are resolved."""
+OF_CONTACT = ("contype", "conaffinity", "condim", "priority", "friction", "solmix", "solref", "solimp", "margin", "gap")
+"""The settings of a geometry's contacts."""
 ADDED = "a plane with default settings"
 """The surface of a file that has none."""
 
@@ -81,7 +83,9 @@ class MuJoCoFile:
         self.spec = mujoco.MjSpec.from_file(str(path))
         if self.is_urdf:  # the root link would become a part of the world
             self.spec.compiler.fusestatic = False
-        self.spec.worldbody.add_geom(name=ADDED, type=PLANE, size=[0.0, 0.0, 1.0])
+        added, plain = (spec.worldbody.add_geom(name=ADDED, type=PLANE, size=[0.0, 0.0, 1.0]) for spec in (self.spec, mujoco.MjSpec()))
+        for name in OF_CONTACT:  # not those of the file's default class
+            setattr(added, name, getattr(plain, name))
         try:
             return self.spec.compile()
         except ValueError as error:

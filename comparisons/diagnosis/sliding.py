@@ -24,7 +24,7 @@ STOPPED = 1e-3  # m/s, of a ball that rolled at 1 m/s
 MARGINAL = 1.01
 """Ratio of the two levers up to which a body, such as a cube with a coefficient of friction of 1, is not said to tip."""
 LEANING = np.array([0.0, 0.01, 0.0101])
-"""Angles by which the lever of the weight about the leading edge is found [rad]: beyond that by which an uneven load tilts a body at rest."""
+"""Angles by which the lever of the weight about the leading edge is found [rad]; an uneven load tilts a body at rest by less."""
 WAYS = ("0°", "45°")
 """Directions of a slide, from an axis of the surface."""
 

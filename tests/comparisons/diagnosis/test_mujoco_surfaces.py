@@ -40,6 +40,16 @@ def test_body_lands_on_what_is_below_it(tmp_path, world, height, option, surface
     assert (facts.surface, facts.unmodelled) == (surface, left_out)
 
 
+def test_plane_that_is_added_has_mujocos_own_settings_not_those_of_the_default_class(tmp_path):
+    of_class = '<default><geom friction=".05" margin=".02" condim="1" contype="0" conaffinity="0"/></default>'
+    geom = '<geom type="box" size=".1 .1 .1" friction=".3" margin="0" condim="3" contype="1" conaffinity="1"/>'
+    body = f'<body name="b" pos="0 0 1"><freejoint/>{geom}</body>'
+    (tmp_path / "model.xml").write_text(f"<mujoco>{of_class}<worldbody>{body}</worldbody></mujoco>")
+    body = MuJoCoModel(tmp_path / "model.xml", "model.xml").body("b", None)
+    assert (body.facts.surface, body.facts.friction) == ("a plane with default settings", 1.0)
+    assert rest(body, ladder(body)[:1])[0].measured == pytest.approx(body.facts.rest_depth, rel=1e-3)
+
+
 def test_ball_rolls_on_when_its_table_ends(tmp_path):
     """MuJoCo's own keeps 0.82 on a wide table, and 0.998 in the flight after a narrow one."""
     ball = '<geom name="g" type="sphere" size=".03" condim="6" friction="1 .005 .001"/>'

@@ -137,7 +137,7 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         return support
     noteworthy = _noteworthy(facts)
     depth, speed, tips = _at_rest(body, dts[0])
-    depth_error, moving = abs(depth - facts.rest_depth), 0.0 if tips else speed
+    depth_error, moving = abs(depth - facts.rest_depth), 0.0 if tips and "wind" not in facts.unknown else speed
     is_wrong = depth_error > noteworthy or moving > noteworthy
     finest_depth, finest_speed, _ = _at_rest(body, dts[-1]) if is_wrong else (depth, speed, tips)
     floats = facts.margin > 0.0 and -depth > noteworthy

@@ -23,7 +23,7 @@ SETTLED = 3.0  # s
 STILL = np.zeros(3)
 ALONG = 1e-9  # angle of a torque to an axis, below which it is along it [rad]
 ROUNDING = 1e-14  # of products of inertia, relative to the moments, and of components, relative to the largest
-Changes = Mapping[str, str | float]
+Changes = Mapping[str, str | float | tuple[float, ...]]
 """Settings to change, by name: those of `LooseBody.remedies`."""
 
 

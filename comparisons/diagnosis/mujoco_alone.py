@@ -95,7 +95,7 @@ class MuJoCoAlone:
             spec = mujoco.MjSpec()
             set_options(spec.option, self.file.model.opt, dt, self._changes)
             spec.option.gravity = gravity
-            spec.option.wind = rotate(self.level, self.file.model.opt.wind)
+            spec.option.wind = rotate(self.level, np.array(spec.option.wind))
             spec.compiler.degree = False
             self._add_bodies(spec)
             if floor:

@@ -53,6 +53,7 @@ REMEDIES: Mapping[str, Changes] = {
     "frictionloss": {"frictionloss": 0.0},
     "density": NO_FLUID,
     "viscosity": NO_FLUID,
+    "wind": {"wind": (0.0, 0.0, 0.0)},
     "sleep_tolerance": {"sleep_tolerance": 0.0},
     "solref": DEFAULT_CONTACT,
     "solimp": DEFAULT_CONTACT,
@@ -101,7 +102,7 @@ class MuJoCoBody(LooseBody):
         return MuJoCoBody(self._name, self._alone.changed(changes))
 
     def patch(self, changes: Changes, dt: float) -> str:
-        texts = {name: value if isinstance(value, str) else f"{value:g}" for name, value in changes.items()}
+        texts = {name: spelled(value) for name, value in changes.items()}
         options = {name: text for name, text in texts.items() if name in OPTIONS}
         options |= {"timestep": f"{dt:g}"} if dt != self.facts.dt else {}
         return self._text.patch(options, {name: text for name, text in texts.items() if name not in options})
@@ -156,6 +157,7 @@ class MuJoCoBody(LooseBody):
         raised = any(not np.array_equal(alone.clamped(pair), pair["solref"]) for pair in alone.pairs.values())
         drag, option = Drag(*alone.damping), self._model.opt
         unmodelled = {"frictionloss": self._model.dof_frictionloss.any(), "density": option.density, "viscosity": option.viscosity}
+        unmodelled["wind"] = option.wind.any() and (option.density or option.viscosity)
         inside = 0.0 if surface is None or alone.names[surface] == ADDED else self._start_inside()
         is_beside = surface is not None and file.model.geom_type[surface] != PLANE and math.isinf(file.height_above(surface, alone.geoms))
         start = ["a start beside or below the surface"] * is_beside

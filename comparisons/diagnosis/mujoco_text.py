@@ -83,7 +83,15 @@ class BodyText:
     def settings(self) -> dict[str, Setting]:
         """The settings that matter, in the words of the file."""
         root, body = self.file.source, self.element
-        options = {"timestep": "0.002", "integrator": "Euler", "cone": "pyramidal", "impratio": "1", "density": "0", "viscosity": "0"}
+        options = {
+            "timestep": "0.002",
+            "integrator": "Euler",
+            "cone": "pyramidal",
+            "impratio": "1",
+            "density": "0",
+            "viscosity": "0",
+            "wind": "0 0 0",
+        }
         found = {name: option_setting(root, "option", name, default) for name, default in options.items()}
         found["sleep_tolerance"] = option_setting(root, "flag", "sleep", "disable")
         of_all = {name: option_setting(root, "option", f"o_{name}", "") for name in overrides(self.model)}

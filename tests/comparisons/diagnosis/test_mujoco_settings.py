@@ -304,6 +304,17 @@ def test_body_that_passes_through_a_thin_table_has_no_rebound(tmp_path):
         assert "passes through the surface" in found.detail
 
 
+def test_wind_that_blows_a_box_away_is_named_and_removed(tmp_path):
+    """A light box of 0.4 m by 0.6 m in a wind of 8 m/s: on a floor with friction 1 it stands still in still air."""
+    box = FREE.format('<geom type="box" size=".1 .2 .3" mass=".05"/>')
+    body = body_of(tmp_path, box, 'density="1.2" wind="8 0 0"')
+    [(answer, found)] = [pair for pair in findings_of(body, rest) if pair[0].quantity == "drift speed"]
+    assert answer.measured > 1.0
+    assert "wind" in found.settings
+    remedy = next(one for one in found.remedies if 'wind="0 0 0"' in one.text)
+    assert remedy.value < 1e-6
+
+
 def bracket(inertia):
     """An L of 0.02 m by 0.02 m bars of 0.2 m, as a mesh of water, with a key for its inertia."""
     outline = [(0, 0), (0.2, 0), (0.2, 0.02), (0.02, 0.02), (0.02, 0.2), (0, 0.2)]

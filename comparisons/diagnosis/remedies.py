@@ -137,6 +137,8 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
             continue
         may_stay = not finding.is_error or (finding.kind == "time step" and not settings)
         for other in again(settings, step):
+            if math.isnan(other.measured):
+                continue  # nothing was measured, such as of a body that now tips
             if finding.is_error and abs(other.measured - answer.exact) > abs(answer.measured - answer.exact):
                 continue  # a finding may also end because a smaller step is judged by another one
             stays = abs(other.measured - other.in_force) > MOST * abs(answer.measured - answer.in_force)

@@ -3,6 +3,7 @@
 import pytest
 from support.model_files import FREE, body_of, findings_of
 
+from dropspin.comparisons.diagnosis.answers import TIPS, Answer, Finding
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.remedies import answers_to
 from dropspin.comparisons.diagnosis.sliding import roll, slide
@@ -23,6 +24,18 @@ def test_ball_that_a_contact_slows_is_due_to_the_contact(tmp_path):
     geom = '<geom name="g" size=".1" solimp=".5 .01 .01 .5 2" solref="-100 -5"/>'
     [answer] = answers_to(roll, body_of(tmp_path, FREE.format(geom), 'cone="elliptic"'))
     assert [found.kind for found in answer.findings] == ["setting"]
+
+
+def test_change_after_which_nothing_is_measured_is_no_remedy(tmp_path):
+    file = body_of(tmp_path, FREE.format(BOX.format("")))
+
+    def tips(body, dts):
+        found = Finding("setting", ("cone", "armature"))
+        slides = Answer("slide", "stopping distance", "m", measured=0.02, in_force=0.01, physical=0.01, findings=(found,))
+        return [slides if body is file else Answer("slide", "stopping distance", "m", detail=TIPS)]
+
+    [answer] = answers_to(tips, file)
+    assert [found.remedies for found in answer.findings] == [()]
 
 
 def test_time_step_of_a_remedy_is_tried_as_if_the_file_had_it(tmp_path):

@@ -68,9 +68,10 @@ def rebound(body: LooseBody, dts: Sequence[float], speed: float, quantity: str) 
     exact = math.nan if body.facts.restitution is None else body.facts.restitution
     answer = Answer("impact", quantity, "1", speed=speed, in_force=exact, detail=found[0].failure)
     if found[0].failure == THROUGH:
-        kind: Kind = "setting" if found[-1].failure == THROUGH else "time step"
-        why = "because the body passes through the surface, which harder contacts or smaller time steps prevent"
-        return replace(answer, detail="none", findings=(Finding(kind, ("timestep",), detail=why),))
+        why, of_step = "because the body passes through the surface", found[-1].failure != THROUGH
+        acting = () if of_step else (*body.causes.get("impact", ()), *body.facts.in_file(*OF_CONTACT))
+        through = Finding("time step" if of_step else "setting", (*acting, "timestep"), detail=why + ", not at smaller steps" * of_step)
+        return replace(answer, detail="none", findings=(through,))
     if found[0].failure:
         return answer
     dts = [dt for dt, impacts in zip(dts, found, strict=True) if not impacts.failure]
@@ -85,7 +86,7 @@ def rebound(body: LooseBody, dts: Sequence[float], speed: float, quantity: str) 
     findings: tuple[Finding, ...] = ()
     if max(change, float(np.ptp(ratios[0]))) > NOTEWORTHY:
         stays = not math.isnan(exact) and abs(means[-1] - exact) >= 0.6 * change
-        kind = "model" if stays else "time step"
+        kind: Kind = "model" if stays else "time step"
         finest = "" if math.isfinite(limit) or len(dts) < 2 else f"but {means[-1]:.3g} at {1e3 * dts[-1]:.3g} ms"
         findings = (Finding(kind, (*body.causes.get("impact", ()), "timestep"), detail=finest),)
     return replace(answer, measured=means[0], limit=limit, findings=findings, least=float(min(ratios[0])), most=float(max(ratios[0])))

@@ -14,7 +14,7 @@ from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, Loos
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
 from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of
-from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ENUMERATIONS, OPTIONS, PLANE, MuJoCoFile
+from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ELLIPTIC, ENUMERATIONS, OPTIONS, PLANE, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_ignored import ignored
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
@@ -59,6 +59,8 @@ REMEDIES: Mapping[str, Changes] = {
     "solimp": DEFAULT_CONTACT,
 }
 
+ROUGH = 2.0
+"""Coefficient of friction from which pyramidal cones soften contacts: a box at rest is six times as deep as with 1, with 5 150 times."""
 CAUSES: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("fall", "spin", "tumble"), ("integrator",)),
     **dict.fromkeys(("impact", "rest", "roll"), ()),
@@ -95,7 +97,8 @@ class MuJoCoBody(LooseBody):
         self._text = BodyText(alone, self._touching)
         self.facts = self._facts()
         contact, sleep = self.facts.in_file(*DEFAULT_CONTACT), ("sleep_tolerance",) * sleeps(self._model.opt)
-        of_contact = {"slide": contact, "roll": contact}
+        softens = ("cone",) * (self._model.opt.cone != ELLIPTIC and self.facts.friction >= ROUGH)
+        of_contact = {"slide": contact, "roll": contact, "impact": softens, "rest": softens}
         self.causes = {question: (*sleep, *acting, *of_contact.get(question, ())) for question, acting in CAUSES.items()}
 
     def changed(self, changes: Changes) -> LooseBody:

@@ -304,6 +304,16 @@ def test_body_that_passes_through_a_thin_table_has_no_rebound(tmp_path):
         assert "passes through the surface" in found.detail
 
 
+def test_pyramidal_cone_through_which_a_rough_body_falls_is_named_and_no_other_setting(tmp_path):
+    """The softening grows with the fourth power of the friction: harder contacts and finer steps do not hold the body."""
+    box = FREE.format('<geom type="box" size=".05 .05 .05" friction="1000" solimp="0.998 0.998 0.001" solref="0.001 1"/>')
+    body = body_of(tmp_path, box)
+    found = [(answer.quantity, found) for question in (impact, rest) for answer, found in findings_of(body, question)]
+    assert {quantity: finding.settings for quantity, finding in found} == dict.fromkeys((REBOUND, "penetration", "drift speed"), ("cone",))
+    depths = [remedy.value for quantity, finding in found if quantity == "penetration" for remedy in finding.remedies]
+    assert depths == pytest.approx([1.5e-5], rel=0.1)
+
+
 def test_wind_that_blows_a_box_away_is_named_and_removed(tmp_path):
     """A light box of 0.4 m by 0.6 m in a wind of 8 m/s: on a floor with friction 1 it stands still in still air."""
     box = FREE.format('<geom type="box" size=".1 .2 .3" mass=".05"/>')

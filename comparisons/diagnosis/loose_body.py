@@ -248,9 +248,12 @@ class LooseBody(ABC):
         return self.put_down(self.facts.dt)
 
     def put_down(self, dt: float) -> Array:
-        """The states of the body that is put down in the file's pose, over three seconds in time steps of dt [s], shape (n, 13)."""
-        weight = -self.facts.gravity * UP
-        found: Array = self.motions(self.facts.start()[np.newaxis], dt, math.ceil(SETTLED / dt), weight, floor=True)[0]
+        """The states of the body that is put down in the file's pose, over three seconds in time steps of dt [s], shape (n, 13).
+
+        It begins where the contact does.
+        """
+        weight, start = -self.facts.gravity * UP, self.facts.start(height=self.facts.margin)
+        found: Array = self.motions(start[np.newaxis], dt, math.ceil(SETTLED / dt), weight, floor=True)[0]
         return found
 
     @abstractmethod

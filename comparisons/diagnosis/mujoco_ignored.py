@@ -118,10 +118,9 @@ def _visual(text: BodyText) -> Iterator[Ignored]:
     has, least = text.properties(text.file.compiled), text.properties(without_visual(text.file.spec))
     if text.element is None or has is None or least is None or not has.mass - least.mass > NOTEWORTHY * has.mass:
         return
-    model, elements = text.model, children_of(text.element, "geom")
-    geoms = np.flatnonzero(model.geom_bodyid == text.head)
+    elements, geoms = children_of(text.element, "geom"), [geom for geom in text.file.spec.geoms if geom.parent.id == text.head]
     pairs = zip(geoms, elements, strict=True) if len(geoms) == len(elements) else ()
-    visual = [element for geom, element in pairs if not (model.geom_contype[geom] or model.geom_conaffinity[geom])]
+    visual = [element for geom, element in pairs if not (geom.contype or geom.conaffinity) and math.isnan(geom.mass)]
     words = visual[0].words if visual else Setting("geometries that collide with nothing")
     yield "visual", words, f"counted in the mass with {has.mass - least.mass:.4g} kg, by density, although it collides with nothing"
 

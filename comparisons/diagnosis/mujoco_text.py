@@ -98,7 +98,8 @@ class BodyText:
         if body is None:
             return found
         places: dict[str, list[Element]] = {"gravcomp": self._bodies} | dict.fromkeys(OF_JOINT, self._joint)
-        places |= dict.fromkeys(("margin", "contype", "conaffinity"), self._elements(self._in_contact))
+        places |= dict.fromkeys(("contype", "conaffinity"), self._elements(self._in_contact))
+        places["margin"] = self._elements(sorted(self._in_contact, key=lambda geom: -self.model.geom_margin[geom]))
         places |= dict.fromkeys(("solref", "solimp", "friction", "condim"), self._elements(self._of_priority))
         inertial = next(iter(children_of(body, "inertial")), None)
         written = {name: [mjcf_setting(one, name) for one in elements] for name, elements in places.items()}
@@ -175,8 +176,8 @@ class BodyText:
         found = [pair.changed(changes) for pair in pairs.values()]
         alone = [number for number in self._contacts if number not in pairs]
         if "margin" in changes:
-            elements = filter(None, (geom_element(self.file, geom) for geom in (*alone, self._surface) if alone and geom is not None))
-            return found + [geom.changed({"margin": 0}) for geom in elements if mjcf_setting(geom, "margin") is not None]
+            wide = [geom for geom in (*alone, self._surface) if alone and geom is not None and self.model.geom_margin[geom]]
+            return found + [geom.changed({"margin": 0}) for geom in filter(None, (geom_element(self.file, one) for one in wide))]
         for number in alone:
             contact = self._contacts[number]
             kept = {"friction": contact["friction"][OF_GEOM], "condim": np.array([contact["condim"]])}

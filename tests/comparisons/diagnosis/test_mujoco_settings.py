@@ -386,7 +386,8 @@ def test_a_body_that_trembles_on_an_undamped_contact_of_the_file_is_due_to_this_
 def test_mass_of_geometries_that_the_file_gives_no_mass_is_named(tmp_path):
     """A box of 1.2 litres: in a frame before one of 1 kg that collides, and as the only geometry of a link that is welded to another."""
     size = 'type="box" size=".1 .05 .03"'
-    visual = f'<frame><geom name="v" {size} contype="0" conaffinity="0"{{}}/></frame><geom {size} mass="1"/>'
+    without, masked = f'<geom name="w" {size} contype="0" conaffinity="0" mass="0"/>', f'{size} contype="0" conaffinity="0"'
+    visual = f'{without}<frame><geom name="v" {masked}{{}}/></frame><geom {size} mass="1"/>'
     made = {}
     for mass in ("", ' mass="0"'):
         alone = '<body name="marker" pos="1 0 1"><freejoint/><geom size=".1" contype="0" conaffinity="0"/></body>'

@@ -1,7 +1,7 @@
 """What a body of an MJCF file lands on, of several planes, boxes and other geometries of the world."""
 
 import pytest
-from support.model_files import ladder
+from support.model_files import findings_of, ladder
 
 from dropspin.comparisons.diagnosis.landing import rest
 from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
@@ -48,6 +48,20 @@ def test_plane_that_is_added_has_mujocos_own_settings_not_those_of_the_default_c
     body = MuJoCoModel(tmp_path / "model.xml", "model.xml").body("b", None)
     assert (body.facts.surface, body.facts.friction) == ("a plane with default settings", 1.0)
     assert rest(body, ladder(body)[:1])[0].measured == pytest.approx(body.facts.rest_depth, rel=1e-3)
+
+
+def test_margin_of_the_floor_is_not_that_of_a_body_that_has_none(tmp_path):
+    body = on(tmp_path, FLOOR.replace("/>", ' margin=".02"/>'), geom=BOX.replace("/>", ' margin="0"/>'))
+    [(_, found)] = findings_of(body, rest)
+    assert body.facts.settings["margin"].text == 'margin=".02"'
+    assert found.remedies[0].text == '<geom name="floor" type="plane" size="0 0 1" margin="0"/> (model.xml, line 1)'
+
+
+def test_capsule_is_put_down_where_a_wide_margin_begins(tmp_path):
+    """Not a metre below, from where the contact would throw it up."""
+    body = on(tmp_path, FLOOR.replace("/>", ' margin="1"/>'), geom='<geom type="capsule" size=".05 .2"/>')
+    depth, drift = rest(body, ladder(body)[:1])
+    assert (depth.measured, drift.measured) == (pytest.approx(-1.0, abs=2e-3), pytest.approx(0.0, abs=1e-6))
 
 
 def test_ball_rolls_on_when_its_table_ends(tmp_path):

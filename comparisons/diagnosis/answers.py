@@ -125,9 +125,9 @@ def judged(body: LooseBody, answer: Answer, dts: Sequence[float], values: Sequen
         values: The value at each.
         exact: The exact value with the settings in force, at each.
     """
-    unknown, causes, free = body.facts.unknown, body.causes.get(answer.question, ()), answer.physical
-    is_acting = {"damping": any(body.facts.falls), "armature": body.facts.armature}
-    is_acting["gravcomp"] = body.facts.lifted and answer.question in OF_WEIGHT
+    unknown, causes, free = body.unknown, body.causes.get(answer.question, ()), answer.physical
+    is_acting = {"damping": any(body.falls), "armature": body.armature}
+    is_acting["gravcomp"] = body.lifted and answer.question in OF_WEIGHT
     acting = tuple(name for name, acts in is_acting.items() if acts)
     if unknown:
         scale = 100.0 if answer.unit == "%" else abs(free) if math.isfinite(free) else 0.0

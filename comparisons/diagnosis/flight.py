@@ -28,34 +28,33 @@ LONGEST = 1_000_000
 
 def fall(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The distance fallen in a second, and the terminal speed."""
-    facts = body.facts
-    if not facts.gravity > 0.0:
+    if not body.gravity > 0.0:
         return [Answer("fall", "gravity", "", detail="none")]
-    start, fallen, exact = facts.start(), [], []
+    start, fallen, exact = body.start(), [], []
     for dt in dts:
         steps = round(FALL / dt)
-        end = body.motions(start[np.newaxis], dt, steps, -facts.gravity * UP, floor=False)[0, -1]
+        end = body.motions(start[np.newaxis], dt, steps, -body.gravity * UP, floor=False)[0, -1]
         fallen.append(start[1] - end[1])
-        exact.append(facts.fallen(steps * dt))
-    free = 0.5 * facts.gravity * (round(FALL / dts[0]) * dts[0]) ** 2
+        exact.append(body.fallen(steps * dt))
+    free = 0.5 * body.gravity * (round(FALL / dts[0]) * dts[0]) ** 2
     answers = [judged(body, Answer("fall", "distance in 1 s", "m", physical=free), dts, fallen, exact)]
-    if any(facts.falls) and not facts.unknown:
-        speed = terminal_speed(facts.gravity * (1.0 - facts.lifted), facts.mass, *facts.falls)
+    if any(body.falls) and not body.unknown:
+        speed = terminal_speed(body.gravity * (1.0 - body.lifted), body.mass, *body.falls)
         answers.append(Answer("fall", "terminal speed", "m/s", in_force=speed, physical=math.inf))
     return answers
 
 
 def spin(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The decay of a spin about each principal axis."""
-    facts, answers = body.facts, []
-    for number, axis in enumerate(facts.principal[1].T):
-        direction, start = vector_text(axis), facts.start(spin=SPEED * axis)
-        exact = facts.slowed(number, SPEED)
+    answers = []
+    for number, axis in enumerate(body.principal[1].T):
+        direction, start = vector_text(axis), body.start(spin=SPEED * axis)
+        exact = body.slowed(number, SPEED)
         if exact < TURN:
             answer = Answer("spin", DECAY_TIME, "s", direction, physical=math.inf)
             values = [_decay(body, start, dt, exact) for dt in dts]
         else:
-            answer, exact = Answer("spin", KEPT, "1", direction, physical=1.0), facts.spun(number, SPEED, TURN) / SPEED
+            answer, exact = Answer("spin", KEPT, "1", direction, physical=1.0), body.spun(number, SPEED, TURN) / SPEED
             values = [float(np.linalg.norm(_turned(body, start, dt)[SPIN])) / SPEED for dt in dts]
         answers.append(judged(body, answer, dts, values, [exact] * len(dts)))
     return answers
@@ -82,7 +81,7 @@ def tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     ends = [_turned(body, start, dt) for dt in dts]
     gains = [float(_energy_gain(body, start, end)) for end in ends]
     of_stated = judged(body, STATED, dts, gains, [exact] * len(dts))
-    if body.facts.unknown:
+    if body.unknown:
         return [of_stated]
     turned = 2.0 * math.degrees(math.acos(min(1.0, abs(float(ends[0][ORIENTATION] @ after[ORIENTATION])))))
     return [of_stated, Answer("tumble", "attitude error", "°", measured=turned, in_force=0.0)]
@@ -90,19 +89,19 @@ def tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
 
 def worst_tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The largest change of energy of a spin over many axes, and from which spin and time step it exceeds 1 %."""
-    facts, dt = body.facts, dts[0]
-    if not _tumbles(body) or facts.unknown:
+    dt = dts[0]
+    if not _tumbles(body) or body.unknown:
         return []
     start, _, exact = _stated(body, dt)
     if abs(exact) > 100.0 * NOTEWORTHY:  # of damping, which no direction and no step is without
         return []
-    axes = facts.principal[1]
+    axes = body.principal[1]
     tried = np.concatenate([DIRECTIONS[DIRECTIONS[:, 1] >= 0.0], DIAGONALS, [OBLIQUE]]) @ axes.T
-    by_direction = _energy_gain(body, starts := np.array([facts.start(spin=SPEED * axis) for axis in tried]), _turned(body, starts, dt))
+    by_direction = _energy_gain(body, starts := np.array([body.start(spin=SPEED * axis) for axis in tried]), _turned(body, starts, dt))
     worst = int(np.argmax(np.abs(by_direction)))
     answers = [Answer("tumble", "largest energy change", "%", vector_text(tried[worst]), measured=float(by_direction[worst]))]
     if abs(by_direction[worst] - exact) > 100.0 * NOTEWORTHY:
-        speed = _threshold(lambda w: _gain(body, facts.start(spin=w * tried[worst]), dt), SLOWEST, FASTEST)
+        speed = _threshold(lambda w: _gain(body, body.start(spin=w * tried[worst]), dt), SLOWEST, FASTEST)
         answers.append(replace(answers[0], quantity="spin for 1 %", unit="rad/s", measured=speed))
     if abs(_gain(body, start, dt) - exact) > 100.0 * NOTEWORTHY:
         step = _threshold(lambda dt: _gain(body, start, dt), 1e-2 * dt, dt)
@@ -112,16 +111,15 @@ def worst_tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
 
 def _tumbles(body: LooseBody) -> bool:
     """Whether a spin of a body is not about a principal axis always, and not damped within a second."""
-    facts = body.facts
-    moments = facts.principal[0]
-    is_slowed = any(facts.slowed(axis, SPEED) < TURN for axis in range(3))
+    moments = body.principal[0]
+    is_slowed = any(body.slowed(axis, SPEED) < TURN for axis in range(3))
     return bool(np.ptp(moments) >= 1e-9 * moments.max()) and not is_slowed
 
 
 def _stated(body: LooseBody, dt: float) -> tuple[Array, Array, float]:
     """The start of the stated spin; with the settings in force, the exact state after a second in steps of dt and the change of energy."""
-    start = body.facts.start(spin=SPEED * OBLIQUE)
-    after = body.facts.in_force(start, np.array([0.0, round(TURN / dt) * dt]), 0.0)[-1]
+    start = body.start(spin=SPEED * OBLIQUE)
+    after = body.in_force(start, np.array([0.0, round(TURN / dt) * dt]), 0.0)[-1]
     return start, after, float(_energy_gain(body, start, after))
 
 
@@ -137,7 +135,7 @@ def _energy_gain(body: LooseBody, first: Array, last: Array) -> Array:
 
     def energy(states: Array) -> Array:
         spins = unrotate(states[..., ORIENTATION], states[..., SPIN])
-        return np.einsum("...i,ij,...j->...", spins, body.facts.inertia, spins)
+        return np.einsum("...i,ij,...j->...", spins, body.inertia, spins)
 
     return 100.0 * (energy(last) / energy(first) - 1.0)
 

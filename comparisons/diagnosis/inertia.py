@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import Answer, Finding, Remedy, digits, vector_text
-from dropspin.comparisons.diagnosis.loose_body import ROUNDING, Facts, MassProperties
+from dropspin.comparisons.diagnosis.loose_body import ROUNDING, LooseBody, MassProperties
 from dropspin.scenarios.bodies.inertia import mean_squares
 from dropspin.scenarios.bodies.possible_moments import largest_multiple
 from dropspin.scenarios.bodies.shape import INERTIA_ROUNDING
@@ -17,22 +17,22 @@ SMALL = 1e-3
 """Share of the largest moment below which products of inertia are left out."""
 
 
-def inertia(facts: Facts) -> list[Answer]:
+def inertia(body: LooseBody) -> list[Answer]:
     """The moments in force beside those of a solid; what is impossible in those of the file, or of the engine if the file has none."""
-    solid, given = facts.solid, facts.written or MassProperties(facts.mass, facts.offset, facts.inertia)
+    solid, given = body.solid, body.written or MassProperties(body.mass, body.offset, body.inertia)
     # Of the mass that the file has: what the engine changes, it changes also with the remedy.
-    of_file = solid if solid is None or not given.mass else solid._replace(mass=given.mass, inertia=given.mass / facts.mass * solid.inertia)
-    answers = list(_impossible(facts, given, of_file))
-    for number, axis in enumerate(facts.principal[1].T):
+    of_file = solid if solid is None or not given.mass else solid._replace(mass=given.mass, inertia=given.mass / body.mass * solid.inertia)
+    answers = list(_impossible(body, given, of_file))
+    for number, axis in enumerate(body.principal[1].T):
         of_solid = math.nan if solid is None else float(axis @ solid.inertia @ axis)
-        moment = float(facts.principal[0][number])
+        moment = float(body.principal[0][number])
         answers.append(Answer("inertia", MOMENT, "kg m²", vector_text(axis), measured=moment, physical=of_solid))
     return answers
 
 
-def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | None) -> Iterator[Answer]:
+def _impossible(body: LooseBody, given: MassProperties, solid: MassProperties | None) -> Iterator[Answer]:
     """Why no body has an inertia, or no body of this shape, mass and centre of mass."""
-    points = facts.points + facts.offset - given.centre if facts.parts else np.zeros((0, 3))
+    points = body.points + body.offset - given.centre if body.parts else np.zeros((0, 3))
     off = np.zeros(3) if solid is None else solid.centre - given.centre
     displaced = f"displaced by ({digits(np.where(np.abs(off) > ROUNDING * np.abs(off).max(), off, 0.0))}) m along the body's axes"
     least, middle, largest = np.linalg.eigvalsh(given.inertia).tolist()
@@ -42,7 +42,7 @@ def _impossible(facts: Facts, given: MassProperties, solid: MassProperties | Non
     elif largest > INERTIA_ROUNDING * (least + middle):
         excess = largest / (least + middle)
     else:
-        if not facts.parts:
+        if not body.parts:
             return
         squares = mean_squares(given.inertia, given.mass)
         excess = _excess(points, squares)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, REBOUND, TIPS, UNTURNED, WATCHED, Answer, Finding, Kind
-from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
+from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.judging.error_budget import error_budget, is_sufficient
 from dropspin.scenarios.rotations import rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, UP, VELOCITY, Array
@@ -45,11 +45,11 @@ class Impacts(NamedTuple):
 
 def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The rebound above the surface in the file's pose, over speeds and start phases; the depth and the time in contact at 1 m/s."""
-    if not body.facts.lands:
+    if not body.lands:
         return []
     answers = [rebound(body, dts, speed, REBOUND) for speed in IMPACTS]
     if "restitution" in body.remedies:
-        lively = body.tried(("restitution",), body.facts.dt)
+        lively = body.tried(("restitution",), body.dt)
         answers += [rebound(lively, dts, speed, f"{REBOUND} on a surface with restitution 1") for speed in IMPACTS]
     found = _impacts(body, 1.0, dts[0], PHASES)
     blank = Answer("impact", "", "1", speed=1.0, detail=found.failure)
@@ -65,11 +65,11 @@ def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
 def rebound(body: LooseBody, dts: Sequence[float], speed: float, quantity: str) -> Answer:
     """The rebound over the speed of an impact [m/s], the mean over start phases: a finding if time step, phase or engine change it."""
     found = [_impacts(body, speed, dt, FEWER if number else PHASES) for number, dt in enumerate(dts)]
-    exact = math.nan if body.facts.restitution is None else body.facts.restitution
+    exact = math.nan if body.restitution is None else body.restitution
     answer = Answer("impact", quantity, "1", speed=speed, in_force=exact, detail=found[0].failure)
     if found[0].failure == THROUGH:
         why, of_step = "because the body passes through the surface", found[-1].failure != THROUGH
-        acting = () if of_step else (*body.causes.get("impact", ()), *body.facts.in_file(*OF_CONTACT))
+        acting = () if of_step else (*body.causes.get("impact", ()), *body.in_file(*OF_CONTACT))
         through = Finding("time step" if of_step else "setting", (*acting, "timestep"), detail=why + ", not at smaller steps" * of_step)
         return replace(answer, detail="none", findings=(through,))
     if found[0].failure:
@@ -97,13 +97,12 @@ def _impacts(body: LooseBody, speed: float, dt: float, phases: int) -> Impacts:
 
     The rebound speed is that which the height above the surface would need, which the body reaches from its speed as it leaves the surface.
     """
-    facts = body.facts
-    g, gap = facts.gravity, facts.margin
-    size = float(np.linalg.norm(facts.points, axis=1).max())
-    starts = [facts.start(height=gap + speed * dt * (phase + 0.5) / phases, velocity=-speed * UP) for phase in range(phases)]
+    g, gap = body.gravity, body.margin
+    size = float(np.linalg.norm(body.points, axis=1).max())
+    starts = [body.start(height=gap + speed * dt * (phase + 0.5) / phases, velocity=-speed * UP) for phase in range(phases)]
     for seconds in (WATCHED, LONGEST_WATCHED):
         motions = body.motions(np.array(starts), dt, math.ceil(seconds / dt), -g * UP, floor=True)
-        heights = [facts.lowest(states) for states in motions]
+        heights = [body.lowest(states) for states in motions]
         found = np.array([_impact(states, of_states, gap, dt, speed, g) for states, of_states in zip(motions, heights, strict=True)])
         moves = np.array([np.ptp(of_states[-len(of_states) // 3 :]) > STILL * speed * seconds for of_states in heights])
         if not (np.isinf(found[:, 3]) & moves).any():
@@ -131,26 +130,25 @@ def _impact(states: Array, heights: Array, gap: float, dt: float, speed: float, 
 
 def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The depth of the body at rest, and its speed there: findings if they differ from the exact ones by 1 % of the body's size."""
-    facts = body.facts
-    through = Finding("setting", facts.in_file("contype", "conaffinity", "group", "mask"), detail=facts.missed)
-    support = [Answer("rest", "support", "", detail="none", findings=(through,))] if facts.missed else []
-    if not facts.lands:
+    through = Finding("setting", body.in_file("contype", "conaffinity", "group", "mask"), detail=body.missed)
+    support = [Answer("rest", "support", "", detail="none", findings=(through,))] if body.missed else []
+    if not body.lands:
         return support
-    noteworthy = _noteworthy(facts)
+    noteworthy = _noteworthy(body)
     depth, speed, tips = _at_rest(body, dts[0])
-    depth_error, moving = abs(depth - facts.rest_depth), 0.0 if tips and "wind" not in facts.unknown else speed
+    depth_error, moving = abs(depth - body.rest_depth), 0.0 if tips and "wind" not in body.unknown else speed
     is_wrong = depth_error > noteworthy or moving > noteworthy
     finest_depth, finest_speed, _ = _at_rest(body, dts[-1]) if is_wrong else (depth, speed, tips)
-    floats = facts.margin > 0.0 and -depth > noteworthy
-    of_depth = _of_error(body, depth_error, abs(finest_depth - facts.rest_depth), noteworthy)
-    if math.isinf(facts.rest_depth):
+    floats = body.margin > 0.0 and -depth > noteworthy
+    of_depth = _of_error(body, depth_error, abs(finest_depth - body.rest_depth), noteworthy)
+    if math.isinf(body.rest_depth):
         endless = "and grows without end: a contact without stiffness holds no body"
-        of_depth = (Finding("setting", facts.in_file(*OF_CONTACT), detail=endless),)
+        of_depth = (Finding("setting", body.in_file(*OF_CONTACT), detail=endless),)
     of_depth = (Finding("setting", ("margin",)),) * floats + of_depth
     of_speed = _of_error(body, moving, finest_speed, noteworthy)
     return [
         *support,
-        Answer("rest", "penetration", "m", measured=depth, in_force=facts.rest_depth, physical=0.0, findings=of_depth),
+        Answer("rest", "penetration", "m", measured=depth, in_force=body.rest_depth, physical=0.0, findings=of_depth),
         Answer("rest", "drift speed", "m/s", measured=speed, physical=0.0, detail=TIPS * tips, findings=of_speed),
     ]
 
@@ -164,27 +162,27 @@ def _of_error(body: LooseBody, error: float, finest: float, noteworthy: float) -
         return ()
     if finest < 0.6 * error:
         return (Finding("time step", ("timestep",)),)
-    acting = (*body.facts.unknown, *body.causes.get("rest", ()), *body.facts.in_file(*OF_CONTACT))
+    acting = (*body.unknown, *body.causes.get("rest", ()), *body.in_file(*OF_CONTACT))
     return (Finding("setting", acting) if acting else Finding("model", ("timestep",)),)
 
 
 def _at_rest(body: LooseBody, dt: float) -> tuple[float, float, bool]:
     """The mean depth [m] and the speed [m/s] of a body that was put down, in the last half second, and whether it tips or rolls."""
-    states = body.settled if dt == body.facts.dt else body.put_down(dt)
+    states = body.settled if dt == body.dt else body.put_down(dt)
     last = states[-math.ceil(0.5 / dt) :]
     speed = float(np.linalg.norm(np.ptp(last[:, POSITION], axis=0))) / 0.5
-    return -float(body.facts.lowest(last).mean()), speed, tilt(states) > UNTURNED
+    return -float(body.lowest(last).mean()), speed, tilt(states) > UNTURNED
 
 
 def is_at_rest(body: LooseBody) -> bool:
     """Whether a body that was put down neither rises nor falls in the last half second, to 1 % of its size."""
-    last = body.settled[-math.ceil(0.5 / body.facts.dt) :]
-    return bool(np.ptp(last[:, POSITION][:, 1]) <= _noteworthy(body.facts))
+    last = body.settled[-math.ceil(0.5 / body.dt) :]
+    return bool(np.ptp(last[:, POSITION][:, 1]) <= _noteworthy(body))
 
 
-def _noteworthy(facts: Facts) -> float:
+def _noteworthy(body: LooseBody) -> float:
     """A length from which a difference is noteworthy [m]."""
-    return NOTEWORTHY * max(float(np.linalg.norm(facts.points, axis=1).max()), 1e-12)
+    return NOTEWORTHY * max(float(np.linalg.norm(body.points, axis=1).max()), 1e-12)
 
 
 def tilt(states: Array) -> float:

@@ -6,7 +6,6 @@ The body is simulated alone, above the surface that it may land on, which is the
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import NamedTuple
 
@@ -43,9 +42,20 @@ class MassProperties(NamedTuple):
     inertia: Array
 
 
-@dataclass(frozen=True, kw_only=True)
-class Facts:
-    """What an engine has in force for a body; `in_force` and `lowest` compute with it.
+def time_of_decay(times: Array, speeds: Array) -> float:
+    """The time at which a speed is 1/e of its start [s], interpolated as an exponential; infinite if it is at none of the times."""
+    below = np.flatnonzero(speeds <= speeds[0] / math.e)
+    if not len(below):
+        return math.inf
+    last = int(below[0])
+    if speeds[last] <= 0.0:
+        return float(times[last])
+    before, after = math.log(speeds[last - 1] / speeds[0]), math.log(speeds[last] / speeds[0])
+    return float(times[last - 1] + (times[last] - times[last - 1]) * (before + 1.0) / (before - after))
+
+
+class LooseBody(ABC):
+    """A body of a user's model that can be simulated alone, in the process of its engine, and what the engine has in force for it.
 
     Attributes:
         name: The body's name in the file, or its number.
@@ -60,7 +70,7 @@ class Facts:
         pose: The orientation of the body in the file, shape (4,).
         resistance: The damping, a function of velocity and spin.
         falls: The damping of a fall.
-        spins: The damping of a spin about each principal axis.
+        spins: The damping of a spin about each of the three principal axes.
         armature: What the settings add to the mass matrix: a mass [kg], and a moment about each axis [kg m²].
         lifted: The share of the weight that the settings take away.
         unknown: The names of the settings by which forces act that no exact solution here includes.
@@ -78,6 +88,8 @@ class Facts:
         unmodelled: What the file has beside the body that the simulations leave out.
         missed: A plane of the file that the body falls through, and why; empty if there is none.
         left_out: What of the file the body collides with, in place of which it lands on a plane that is added; empty if there is nothing.
+        remedies: By the name of a setting, the changes that take its effect away.
+        causes: By question, the settings that may change errors, beside the time step.
     """
 
     name: str
@@ -92,7 +104,7 @@ class Facts:
     pose: Array
     resistance: Resistance
     falls: Drag
-    spins: tuple[Drag, Drag, Drag] = (Drag(), Drag(), Drag())
+    spins: Sequence[Drag]
     armature: float = 0.0
     lifted: float = 0.0
     unknown: Sequence[str] = ()
@@ -110,6 +122,8 @@ class Facts:
     unmodelled: Sequence[str]
     missed: str = ""
     left_out: str = ""
+    remedies: Mapping[str, Changes]
+    causes: Mapping[str, tuple[str, ...]]
 
     @cached_property
     def lowest(self) -> Callable[[Array], Array]:
@@ -197,32 +211,6 @@ class Facts:
             found += self.mass * share * about
         return MassProperties(self.mass, centre + self.offset, found)
 
-
-def time_of_decay(times: Array, speeds: Array) -> float:
-    """The time at which a speed is 1/e of its start [s], interpolated as an exponential; infinite if it is at none of the times."""
-    below = np.flatnonzero(speeds <= speeds[0] / math.e)
-    if not len(below):
-        return math.inf
-    last = int(below[0])
-    if speeds[last] <= 0.0:
-        return float(times[last])
-    before, after = math.log(speeds[last - 1] / speeds[0]), math.log(speeds[last] / speeds[0])
-    return float(times[last - 1] + (times[last] - times[last - 1]) * (before + 1.0) / (before - after))
-
-
-class LooseBody(ABC):
-    """A body of a user's model that can be simulated alone, in the process of its engine.
-
-    Attributes:
-        facts: What is in force.
-        remedies: By the name of a setting, the changes that take its effect away.
-        causes: By question, the settings that may change errors, beside the time step.
-    """
-
-    facts: Facts
-    remedies: Mapping[str, Changes]
-    causes: Mapping[str, tuple[str, ...]]
-
     @abstractmethod
     def changed(self, changes: Changes) -> "LooseBody":
         """The body with other settings."""
@@ -233,7 +221,7 @@ class LooseBody(ABC):
 
         @cache
         def body(settings: tuple[str, ...], dt: float) -> LooseBody:
-            changes = {**self.changes(settings), **({"timestep": dt} if dt != self.facts.dt else {})}
+            changes = {**self.changes(settings), **({"timestep": dt} if dt != self.dt else {})}
             return self.changed(changes) if changes else self
 
         return body
@@ -245,14 +233,14 @@ class LooseBody(ABC):
     @cached_property
     def settled(self) -> Array:
         """`put_down` at the file's time step."""
-        return self.put_down(self.facts.dt)
+        return self.put_down(self.dt)
 
     def put_down(self, dt: float) -> Array:
         """The states of the body that is put down in the file's pose, over three seconds in time steps of dt [s], shape (n, 13).
 
         It begins where the contact does.
         """
-        weight, start = -self.facts.gravity * UP, self.facts.start(height=self.facts.margin)
+        weight, start = -self.gravity * UP, self.start(height=self.margin)
         found: Array = self.motions(start[np.newaxis], dt, math.ceil(SETTLED / dt), weight, floor=True)[0]
         return found
 

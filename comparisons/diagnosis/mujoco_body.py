@@ -1,7 +1,7 @@
 """A free body of a file that MuJoCo compiles, simulated alone, with the values that the compiled model has."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from mujoco import rollout
 
 from dropspin.comparisons.diagnosis.geometries import Part, at_point, lowest_of
-from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
+from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, LooseBody
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
 from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of
@@ -86,28 +86,39 @@ class MuJoCoBody(LooseBody):
     """
 
     def __init__(self, name: str, alone: MuJoCoAlone) -> None:
-        self._name, self._alone, self._file, self.remedies = name, alone, alone.file, REMEDIES
-        self._model = alone.model(alone.file.model.opt.timestep, np.zeros(3), floor=False)
+        file, self._alone, self._file, self.remedies = alone.file, alone, alone.file, REMEDIES
+        self.name, self.engine, self.version = name, "MuJoCo", mujoco.__version__
+        self.dt, self.gravity = file.model.opt.timestep, float(np.linalg.norm(file.gravity))
+        self._model = alone.model(self.dt, np.zeros(3), floor=False)
         found = mass_properties(self._model, self._at_rest, range(1, self._model.nbody))
         assert found is not None  # bodies without mass are left out
-        self._properties: MassProperties = found
-        self._offset = found.centre
-        self._pose = multiply(alone.level, np.roll(alone.file.data.xquat[alone.head], -1))
+        self.mass, self.offset, self.inertia = found
+        self.pose = multiply(alone.level, np.roll(file.data.xquat[alone.head], -1))
+        self.parts = list(self._parts())
+        self.falls, self.resistance, self.armature = Drag(*alone.damping), joint_damping(*alone.damping), alone.armature
+        self.spins = [self.falls] * 3
+        # The share of the weight that `gravcomp` of the body and of what is welded to it takes away.
+        self.lifted = float(np.average(self._model.body_gravcomp[1:], weights=self._model.body_mass[1:]))
+        option = self._model.opt
+        unmodelled = {"frictionloss": self._model.dof_frictionloss.any(), "density": option.density, "viscosity": option.viscosity}
+        unmodelled["wind"] = option.wind.any() and (option.density or option.viscosity)
+        self.unknown = [name for name, acts in unmodelled.items() if acts]
         self._touching = {geom: alone.in_force_of(geom) for geom in self._lowest}
         self._text = BodyText(alone, self._touching)
-        self.facts = self._facts()
-        contact, sleep = self.facts.in_file(*DEFAULT_CONTACT), ("sleep_tolerance",) * sleeps(self._model.opt)
-        softens = ("cone",) * (self._model.opt.cone != ELLIPTIC and self.facts.friction >= ROUGH)
+        self.written, self.settings = self._text.written, self._text.settings
+        self._land()
+        contact, sleep = self.in_file(*DEFAULT_CONTACT), ("sleep_tolerance",) * sleeps(option)
+        softens = ("cone",) * (option.cone != ELLIPTIC and self.friction >= ROUGH)
         of_contact = {"slide": contact, "roll": contact, "impact": softens, "rest": softens}
         self.causes = {question: (*sleep, *acting, *of_contact.get(question, ())) for question, acting in CAUSES.items()}
 
     def changed(self, changes: Changes) -> LooseBody:
-        return MuJoCoBody(self._name, self._alone.changed(changes))
+        return MuJoCoBody(self.name, self._alone.changed(changes))
 
     def patch(self, changes: Changes, dt: float) -> str:
         texts = {name: spelled(value) for name, value in changes.items()}
         options = {name: text for name, text in texts.items() if name in OPTIONS}
-        options |= {"timestep": f"{dt:g}"} if dt != self.facts.dt else {}
+        options |= {"timestep": f"{dt:g}"} if dt != self.dt else {}
         return self._text.patch(options, {name: text for name, text in texts.items() if name not in options})
 
     def for_restitution(self, restitution: float, dt: float) -> Changes:
@@ -118,15 +129,15 @@ class MuJoCoBody(LooseBody):
 
     @property
     def likeness(self) -> tuple[object, ...]:
-        model = self._alone.model(self.facts.dt, np.zeros(3), floor=bool(self.facts.surface))
+        model = self._alone.model(self.dt, np.zeros(3), floor=bool(self.surface))
         stored = np.empty(mujoco.mj_sizeModel(model), np.uint8)
         mujoco.mj_saveModel(model, None, stored)
         element = self._text.element
         words = [] if element is None else [one.words for one in (*element.children, element)]
-        return stored.tobytes(), self.facts.pose.tobytes(), self.facts.surface, *self.facts.unmodelled, *words
+        return stored.tobytes(), self.pose.tobytes(), self.surface, *self.unmodelled, *words
 
     def elsewhere(self, dt: float, changes: Changes) -> tuple[int, bool]:
-        is_global = dt != self.facts.dt or any(name in OPTIONS for name in changes)
+        is_global = dt != self.dt or any(name in OPTIONS for name in changes)
         others = [body for body in self._file.heads.values() if body != self._alone.head] if is_global else []
         return len(others), not is_global or self._file.runs(dt, changes)
 
@@ -134,7 +145,7 @@ class MuJoCoBody(LooseBody):
         model = self._alone.model(dt, gravity, floor=floor)
         data = mujoco.MjData(model)
         first = np.tile(full_state(model, data), (len(starts), 1))
-        first[:, 1:14] = from_world(at_point(starts, -self._offset))
+        first[:, 1:14] = from_world(at_point(starts, -self.offset))
         rows = np.empty((len(starts), 1 + steps, first.shape[1]))
         rows[:, 0] = first
         if steps:
@@ -142,7 +153,7 @@ class MuJoCoBody(LooseBody):
                 rows[:, 1:], _ = rollout.rollout(model, data, first, nstep=steps)
         if any(warning.number for warning in data.warning[-3:]) or not np.isfinite(rows).all():
             raise Diverged(f"MuJoCo's state became NaN or too large within {steps} steps of {dt:g} s")
-        return at_point(to_world(rows[..., 1:14]), self._offset)
+        return at_point(to_world(rows[..., 1:14]), self.offset)
 
     @cached_property
     def _at_rest(self) -> Any:
@@ -151,111 +162,78 @@ class MuJoCoBody(LooseBody):
         mujoco.mj_kinematics(self._model, data)
         return data
 
-    def _facts(self) -> Facts:
+    def _land(self) -> None:
+        """Set what is in force between the body and what it lands on."""
         alone, file = self._alone, self._file
         off = alone.gravity_angle
         is_above = off < 90.0 - LEVEL  # also without gravity
         touching = next(iter(self._touching.values()), None) if is_above else None
         surface = None if touching is None else alone.surface
+        self.surface, self.others = "" if surface is None else alone.names[surface], [alone.names[geom] for geom in alone.others]
+        self.missed, self.left_out = alone.missed if is_above and file.gravity.any() else "", alone.left_out
+        every = {friction_of(one) for one in self._touching.values()}
+        frictions = (0.0, 0.0) if touching is None else next(iter(every)) if len(every) == 1 else (math.nan, math.nan)
+        self.friction, self.friction_across = frictions[0], math.nan if frictions[0] == frictions[1] else frictions[1]
+        self.margin, condim = (0.0, 0) if touching is None else (_margin(touching), int(touching["condim"]))
+        self.rolling = touching is not None and condim == 6 and bool(np.any(touching["friction"][3:]))
+        self.rest_depth = self._rest_depth()
         raised = any(not np.array_equal(alone.clamped(pair), pair["solref"]) for pair in alone.pairs.values())
-        drag, option = Drag(*alone.damping), self._model.opt
-        unmodelled = {"frictionloss": self._model.dof_frictionloss.any(), "density": option.density, "viscosity": option.viscosity}
-        unmodelled["wind"] = option.wind.any() and (option.density or option.viscosity)
+        self.ignored = list(ignored(self._text, self, raised=raised, condim=condim))
         inside = 0.0 if surface is None or alone.names[surface] == ADDED else self._start_inside()
         is_beside = surface is not None and file.model.geom_type[surface] != PLANE and math.isinf(file.height_above(surface, alone.geoms))
         start = ["a start beside or below the surface"] * is_beside
         start += [f"a start {inside:.3g} m inside the surface"] * bool(inside > DEEP * self._model.stat.extent)
         tilted = [f"a gravity {off:.3g}° from the inward normal of the surface"] * (off > LEVEL)
-        every = {friction_of(one) for one in self._touching.values()}
-        frictions = (0.0, 0.0) if touching is None else next(iter(every)) if len(every) == 1 else (math.nan, math.nan)
         names = ", ".join(alone.names[geom] for geom in self._touching)
         several = [f"a slide on geometries of different friction ({names})"] * (len(every) > 1)
-        return Facts(
-            name=self._name,
-            engine="MuJoCo",
-            version=mujoco.__version__,
-            dt=file.model.opt.timestep,
-            gravity=float(np.linalg.norm(file.gravity)),
-            mass=self._properties.mass,
-            inertia=self._properties.inertia,
-            offset=self._offset,
-            parts=self._parts,
-            pose=self._pose,
-            resistance=joint_damping(*alone.damping),
-            falls=drag,
-            spins=(drag, drag, drag),
-            armature=alone.armature,
-            lifted=self._lifted,
-            unknown=[name for name, acts in unmodelled.items() if acts],
-            surface="" if surface is None else alone.names[surface],
-            others=[alone.names[geom] for geom in alone.others],
-            friction=frictions[0],
-            friction_across=math.nan if frictions[0] == frictions[1] else frictions[1],
-            margin=0.0 if touching is None else _margin(touching),
-            rolling=touching is not None and touching["condim"] == 6 and bool(np.any(touching["friction"][3:])),
-            rest_depth=self._rest_depth(),
-            written=self._text.written,
-            settings=self._text.settings,
-            ignored=list(ignored(self._text, self._properties, raised=raised, condim=0 if touching is None else int(touching["condim"]))),
-            unmodelled=[*file.unmodelled(alone.head), *start, *tilted, *several, *[alone.left_out] * bool(alone.left_out)],
-            missed=alone.missed if is_above and file.gravity.any() else "",
-            left_out=alone.left_out,
-        )
+        self.unmodelled = [*file.unmodelled(alone.head), *start, *tilted, *several, *[alone.left_out] * bool(alone.left_out)]
 
-    @cached_property
-    def _lifted(self) -> float:
-        """The share of the weight that `gravcomp` of the body and of what is welded to it takes away."""
-        return float(np.average(self._model.body_gravcomp[1:], weights=self._model.body_mass[1:]))
-
-    @cached_property
-    def _parts(self) -> Sequence[Part]:
+    def _parts(self) -> Iterator[Part]:
         """The geometries as shapes, relative to the centre of mass."""
-        data, pairs, found = self._at_rest, self._alone.pairs, []
+        data, pairs = self._at_rest, self._alone.pairs
         for number, geom in enumerate(self._alone.geoms):
             shape, shift, turned = shape_of(self._model, number)
             turn = quaternion(data.geom_xmat[number])
-            position = data.geom_xpos[number] - self._offset + rotate(turn, shift)
-            found.append(Part(self._alone.names[geom], shape, position, multiply(turn, turned), not pairs or geom in pairs))
-        return found
+            position = data.geom_xpos[number] - self.offset + rotate(turn, shift)
+            yield Part(self._alone.names[geom], shape, position, multiply(turn, turned), not pairs or geom in pairs)
 
     @property
     def _lowest(self) -> list[int]:
         """The geometries that touch a level surface first in the pose of the file."""
         heights = {}
-        for geom, part in zip(self._alone.geoms, self._parts, strict=True):
+        for geom, part in zip(self._alone.geoms, self.parts, strict=True):
             if geom in self._alone.pairs:
-                heights[geom] = lowest_of([part], self._pose) - _margin(self._alone.in_force_of(geom))
+                heights[geom] = lowest_of([part], self.pose) - _margin(self._alone.in_force_of(geom))
         tolerance = SAME_HEIGHT * self._model.stat.extent
         return [geom for geom, height in heights.items() if height <= min(heights.values()) + tolerance]
 
     def _rest_depth(self) -> float:
         """The depth of a body that rests on one point, or on several that share its weight, below the surface [m]; NaN of others."""
         contact, armature = self._alone.contact, self._alone.armature
-        is_central = not (armature and self._offset.any()) and self._lifted < 1.0 and not np.ptp(self._model.body_gravcomp[1:])
+        is_central = not (armature and self.offset.any()) and self.lifted < 1.0 and not np.ptp(self._model.body_gravcomp[1:])
         is_still = not self._model.opt.wind.any()  # the air moves no body at rest
         points = self._points() if contact is not None and is_central and is_still else 0
         if not points or contact is None:
             return np.nan
-        mass = self._properties.mass
-        load = float(np.linalg.norm(self._file.gravity)) * (1.0 - self._lifted) * mass / (mass + armature) / points
+        load = self.gravity * (1.0 - self.lifted) * self.mass / (self.mass + armature) / points
         return contact.depth(load) - contact.settings.margin
 
     def _start_inside(self) -> float:
         """How far below a plane the body's lowest point is in the file [m]; 0 if it lands on a box, which it may be beside."""
         alone, file = self._alone, self._file
-        parts = [part for part in self._parts if part.collides]
+        parts = [part for part in self.parts if part.collides]
         if file.model.geom_type[alone.surface] != PLANE or not parts:
             return 0.0
-        centre = alone.above_plane(file.data.xpos[alone.head]) + rotate(self._pose, self._offset)
-        return -float(centre[1] + lowest_of(parts, self._pose))
+        centre = alone.above_plane(file.data.xpos[alone.head]) + rotate(self.pose, self.offset)
+        return -float(centre[1] + lowest_of(parts, self.pose))
 
     def _points(self) -> int:
         """The number of contacts in the pose of the file that share the weight evenly; 0 if they do not."""
         model = self._alone.model(self._file.model.opt.timestep, np.zeros(3), floor=True)
         data, size = mujoco.MjData(model), float(model.stat.extent)
-        parts = [part for part in self._parts if part.collides]
-        data.qpos[:] = [*(-rotate(self._pose, self._offset)), *np.roll(self._pose, 1)]
-        data.qpos[1] -= lowest_of(parts, self._pose) + FLAT * size
+        parts = [part for part in self.parts if part.collides]
+        data.qpos[:] = [*(-rotate(self.pose, self.offset)), *np.roll(self.pose, 1)]
+        data.qpos[1] -= lowest_of(parts, self.pose) + FLAT * size
         with quiet():
             mujoco.mj_forward(model, data)
         places = data.contact.pos[:, [0, 2]]

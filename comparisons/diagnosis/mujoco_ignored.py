@@ -9,7 +9,7 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, digits
 from dropspin.comparisons.diagnosis.geometries import is_whole
-from dropspin.comparisons.diagnosis.loose_body import MassProperties
+from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.diagnosis.mjcf_defaults import option_setting
 from dropspin.comparisons.diagnosis.mujoco_elements import children_of
 from dropspin.comparisons.diagnosis.mujoco_file import BODY
@@ -28,12 +28,12 @@ PER_METRE = {"cm": 100.0, "mm": 1000.0}
 """Units of length in which models are written by mistake."""
 
 
-def ignored(text: BodyText, in_force: MassProperties, *, raised: bool, condim: int) -> Iterator[Ignored]:
+def ignored(text: BodyText, in_force: LooseBody, *, raised: bool, condim: int) -> Iterator[Ignored]:
     """What the file says and MuJoCo changes or does not use.
 
     Args:
         text: The body in the words of its file.
-        in_force: The mass and the inertia in force.
+        in_force: The body, with the mass and the inertia in force.
         raised: Whether the time constant of a contact is raised.
         condim: The dimensions of the contact with what the body lands on; 0 without one.
     """

@@ -7,7 +7,6 @@ the inertial frame whose pose PyBullet reports.
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ import pybullet_data  # type: ignore[import-untyped]
 
 from dropspin.comparisons.diagnosis.geometries import Part, at_point, lowest_of
 from dropspin.comparisons.diagnosis.inertia import inertia
-from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, MassProperties
+from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, LooseBody, MassProperties
 from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Link, read_links
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.source import Ignored, Setting
@@ -93,7 +92,8 @@ class PyBulletBody(LooseBody):
     """
 
     def __init__(self, model: PyBulletModel, name: str, changes: Changes) -> None:
-        self._model, self._name, self._changes = model, name, changes
+        self._model, self._changes = model, changes
+        self.name, self.engine, self.version, self.dt, self.gravity = name, "PyBullet", version("pybullet"), STEP, GRAVITY
         without = ("stiffness", "damping") if "stiffness" in changes else ()
         self._file = model.cut_loose(name, *without) if without or len(model.heads) > 1 else str(model.path)
         body, self._plane = self._world(True)
@@ -109,16 +109,16 @@ class PyBulletBody(LooseBody):
         centres = np.array([link.position for link in self._links])
         centre = np.average(centres, axis=0, weights=self._masses)
         self._arms, self._arm = centres - centre, unrotate(first.turn, centre - first.position)
-        self.facts = self._facts(centre, own)
+        self._find_in_force(centre, own)
         of_spring = dict.fromkeys(("slide", "roll"), ("stiffness",))
-        self.causes = of_spring if "stiffness" in self.facts.settings else {"impact": ("contactERP",)}
+        self.causes = of_spring if "stiffness" in self.settings else {"impact": ("contactERP",)}
         self.remedies = {"damping": {"damping": 0.0}, "inertia": {"inertia": "file"}, "contactERP": {"contactERP": 0.0}}
         self.remedies["stiffness"] = {"stiffness": "none"}
         if any(link.restitution > 0.0 for link in self._touching):
             self.remedies["restitution"] = {"restitution": 1.0}
 
     def changed(self, changes: Changes) -> LooseBody:
-        return PyBulletBody(self._model, self._name, {**self._changes, **changes})
+        return PyBulletBody(self._model, self.name, {**self._changes, **changes})
 
     def patch(self, changes: Changes, dt: float) -> str:
         texts = CALLS if len(self._links) == 1 else CALLS | {"own restitution": OF_EVERY_LINK}
@@ -170,49 +170,35 @@ class PyBulletBody(LooseBody):
             bullet.holds, bullet.numbers = (self, floor), (body, plane)
         return bullet.numbers
 
-    def _facts(self, centre: Array, own: Array) -> Facts:
-        """What is in force; `own` is the sum of the links' tensors about their own centres of mass."""
+    def _find_in_force(self, centre: Array, own: Array) -> None:
+        """Set what is in force; `own` is the sum of the links' tensors about their own centres of mass."""
         mass, squares = float(self._masses.sum()), np.sum(self._masses * np.sum(self._arms**2, axis=1))
         kappa = 0.0 if "damping" in self._changes else DAMPING
+        self.mass, self.inertia = mass, own + squares * np.eye(3) - (self._arms.T * self._masses) @ self._arms
+        self.offset, self.pose = np.zeros(3), Z_TO_Y
+        self.resistance, self.falls = self._resistance(own, kappa), Drag(kappa * mass, kappa * mass)
+        self.spins = [self._drag(axis, own, kappa) for axis in self.principal[1].T]
         plane = server().getDynamicsInfo(self._plane, -1)
         owned = [(link, part, _height(part)) for link in self._links for part in link.parts(self._model, centre)]
         parts, written = [part for _, part, _ in owned], self._links[0].written
         lowest = min((height for _, _, height in owned), default=0.0)
         self._touching = [link for link, _, height in owned if height <= lowest + SLOP] or self._links[:1]
         touching, bottom = self._touching, [part for _, part, height in owned if height == lowest]
-        margin = MARGIN if any(part.shape.shape == "mesh" for part in bottom) else 0.0
         frictions, restitutions = {link.dynamics[1] for link in touching}, {(link.restitution, link.dynamics[9]) for link in touching}
         is_hard = all(link.dynamics[9] < 0.0 for link in touching)  # a spring and damper have no restitution
         is_held = any(part.collides for part in parts)
-        facts = Facts(
-            name=self._name,
-            engine="PyBullet",
-            version=version("pybullet"),
-            dt=STEP,
-            gravity=GRAVITY,
-            mass=mass,
-            inertia=own + squares * np.eye(3) - (self._arms.T * self._masses) @ self._arms,
-            offset=np.zeros(3),
-            parts=parts,
-            pose=Z_TO_Y,
-            resistance=self._resistance(own, kappa),
-            falls=Drag(kappa * mass, kappa * mass),
-            surface=SURFACE if is_held else "",
-            friction=touching[0].dynamics[1] * plane[1] if len(frictions) == 1 else math.nan,
-            restitution=touching[0].restitution * plane[5] if is_hard and len(restitutions) == 1 else None,
-            margin=margin,
-            rolling=any(link.dynamics[6] > 0.0 for link in touching),
-            rest_depth=SLOP - margin if is_hard else math.nan,
-            written=None if written is None or len(self._links) > 1 else MassProperties(mass, np.zeros(3), written),
-            settings=self._settings(touching[0]),
-            ignored=self._ignored(plane[5]),
-            missed=f"{SURFACE}: its collision group and mask exclude static bodies" if parts and not is_held else "",
-            unmodelled=["joints"] if len(self._model.heads) > 1 else [],
-        )
-        if not parts or any(answer.findings for answer in inertia(facts)):
-            parts = [*parts, *(part for link in self._links for part in link.parts(self._model, centre, visual=True))]
-        x, y, z = (self._drag(axis, own, kappa) for axis in facts.principal[1].T)
-        return replace(facts, spins=(x, y, z), parts=parts)
+        self.parts, self.surface = parts, SURFACE if is_held else ""
+        self.missed = f"{SURFACE}: its collision group and mask exclude static bodies" if parts and not is_held else ""
+        self.friction = touching[0].dynamics[1] * plane[1] if len(frictions) == 1 else math.nan
+        self.restitution = touching[0].restitution * plane[5] if is_hard and len(restitutions) == 1 else None
+        self.margin = MARGIN if any(part.shape.shape == "mesh" for part in bottom) else 0.0
+        self.rolling = any(link.dynamics[6] > 0.0 for link in touching)
+        self.rest_depth = SLOP - self.margin if is_hard else math.nan
+        self.written = None if written is None or len(self._links) > 1 else MassProperties(mass, np.zeros(3), written)
+        self.settings, self.ignored = self._settings(touching[0]), self._ignored(plane[5])
+        self.unmodelled = ["joints"] if len(self._model.heads) > 1 else []
+        if not parts or any(answer.findings for answer in inertia(self)):
+            self.parts = [*parts, *(part for link in self._links for part in link.parts(self._model, centre, visual=True))]
 
     def _drag(self, axis: Array, own: Array, kappa: float) -> Drag:
         """The damping of a spin about an axis: each link is damped by its own speed, ω times its distance from the axis."""
@@ -233,7 +219,7 @@ class PyBulletBody(LooseBody):
 
     def _settings(self, touching: Link) -> dict[str, Setting]:
         """The settings that matter, those of contacts of a link that touches, in the words of the file or as PyBullet's defaults."""
-        link = self._model.links[self._name]
+        link = self._model.links[self.name]
         owned = [(link if name in ("inertia", "mass") else touching.element, tag, at, name) for tag, at, name in WRITTEN]
         written = {name: found for owner, tag, at, name in owned for one in owner.every(tag) if (found := one.setting(at))}
         for inertial in link.every("inertial"):
@@ -246,7 +232,7 @@ class PyBulletBody(LooseBody):
         for link in self._links[1:]:
             name = link.element.attributes["name"]
             found += [(f"{key} of {name}", setting, made) for key, setting, made in link.ignored(SURFACE, restitution)]
-        joints = [joint for joint in self._model.joints(self._name) if joint.attributes["type"] == "floating"]
+        joints = [joint for joint in self._model.joints(self.name) if joint.attributes["type"] == "floating"]
         return found + [("joint", joint.words, "replaced by a fixed joint") for joint in joints]
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, NOTEWORTHY, REBOUND, Answer, Finding, Kind, Remedy
 from dropspin.comparisons.diagnosis.landing import rebound
-from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
+from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.running.ablation import shares
 
@@ -41,7 +41,7 @@ class Targets(NamedTuple):
 
         A contact with a plane that is added in place of what the file has is not judged.
         """
-        is_of_file = not (body.facts.missed or body.facts.left_out)
+        is_of_file = not (body.missed or body.left_out)
         missing = [answer for answer in answers if is_of_file and not self.meets(answer)]
         remedies = self._for_restitution(body, answers) if any(answer.quantity == REBOUND for answer in missing) else {}
         for answer in answers:
@@ -50,7 +50,7 @@ class Targets(NamedTuple):
         measured = {answer.quantity for answer in answers if is_of_file}
         for quantity in (name for name in self.wanted if name not in measured):
             question = "impact" if quantity == REBOUND else "friction"
-            finding = Finding("target", detail=f"the target is {self.wanted[quantity]:g}, but {_why_unmeasured(body.facts)}")
+            finding = Finding("target", detail=f"the target is {self.wanted[quantity]:g}, but {_why_unmeasured(body)}")
             yield Answer(question, quantity, "1", detail="not measured", findings=(finding,))
 
     def meets(self, answer: Answer) -> bool:
@@ -61,7 +61,7 @@ class Targets(NamedTuple):
     def _for_restitution(self, body: LooseBody, answers: Sequence[Answer]) -> dict[float, tuple[Remedy]]:
         """By the speed of an impact, settings for the restitution: at the file's time step, if these meet the target at all speeds."""
         found: dict[float, tuple[Remedy]] = {}
-        for step in (body.facts.dt, _rounded(0.125 * body.facts.dt)):
+        for step in (body.dt, _rounded(0.125 * body.dt)):
             changes = body.for_restitution(self.wanted[REBOUND], step)
             text, elsewhere, lively = body.patch(changes, step), body.elsewhere(step, changes), body.changed(changes)
             others = [rebound(lively, [step], answer.speed, REBOUND) for answer in answers if answer.quantity == REBOUND]
@@ -71,15 +71,15 @@ class Targets(NamedTuple):
         return found
 
 
-def _why_unmeasured(facts: Facts) -> str:
+def _why_unmeasured(body: LooseBody) -> str:
     """Why nothing was measured for a target."""
-    if facts.missed or not facts.surface:
-        return facts.missed or "the body lands on no surface"
-    if not facts.lands:
+    if body.missed or not body.surface:
+        return body.missed or "the body lands on no surface"
+    if not body.lands:
         return "gravity does not hold the body on a surface"
-    if facts.left_out:
-        return f"the simulation leaves out {facts.left_out}"
-    return "the geometries that touch the surface differ in it" if math.isnan(facts.friction) else "the simulation broke down"
+    if body.left_out:
+        return f"the simulation leaves out {body.left_out}"
+    return "the geometries that touch the surface differ in it" if math.isnan(body.friction) else "the simulation broke down"
 
 
 NO_TARGETS = Targets()
@@ -87,7 +87,7 @@ NO_TARGETS = Targets()
 
 def answers_to(question: Question, body: LooseBody, targets: Targets = NO_TARGETS) -> Iterator[Answer]:
     """The answers to a question, each finding with the remedies that remove it and miss no target that was met; of a breakdown, why."""
-    dt = body.facts.dt
+    dt = body.dt
     try:
         answers = question(body, [dt * factor for factor in HALVINGS])
     except Diverged as error:
@@ -144,10 +144,10 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
             stays = abs(other.measured - other.in_force) > MOST * abs(answer.measured - answer.in_force)
             # At rest, an error at one time step alone is not known to be one of the step.
             is_wrong = answer.question == "rest" and any(one.settings != ("margin",) for one in other.findings)
-            remains = is_wrong or any(one.is_error == finding.is_error or body.facts.unknown for one in other.findings)
+            remains = is_wrong or any(one.is_error == finding.is_error or body.unknown for one in other.findings)
             if (may_stay or not stays) and not remains:
                 found[settings] = Remedy(body.patch(changes, step), other.measured, other.unit, *body.elsewhere(step, changes))
-                changed = changed or {*changes, *["timestep"] * (step != body.facts.dt)}
+                changed = changed or {*changes, *["timestep"] * (step != body.dt)}
     if not found and finding.is_error:
         is_step = finding.kind == "time step"
         return finding._replace(settings=("timestep",)) if is_step else finding._replace(settings=(), tried=finding.settings)
@@ -162,7 +162,7 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
 
 def _tries(body: LooseBody, answer: Answer, finding: Finding) -> Iterator[tuple[tuple[str, ...], float]]:
     """The settings whose effect to take away, one by one, then together, and the time step [s]."""
-    dt, known = body.facts.dt, [name for name in finding.settings if name in body.remedies]
+    dt, known = body.dt, [name for name in finding.settings if name in body.remedies]
     for name in known:
         yield (name,), dt
         if finding.kind == "model":

@@ -8,7 +8,7 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import KEPT, MOVES, TIPS, UNTURNED, WATCHED, Answer, judged
 from dropspin.comparisons.diagnosis.landing import is_at_rest, tilt
-from dropspin.comparisons.diagnosis.loose_body import Facts, LooseBody
+from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.damped_joint import spin_about_axis
@@ -31,32 +31,31 @@ WAYS = ("0°", "45°")
 
 def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The distance in which a body that slides stops, along an axis of the surface and at 45 degrees to it."""
-    facts = body.facts
-    if not facts.lands or not facts.friction > 0.0 or _is_ball(facts):
+    if not body.lands or not body.friction > 0.0 or _is_ball(body):
         return []
-    free, exact = SLIDE**2 / (2.0 * facts.friction * facts.gravity), _stop(facts)
+    free, exact = SLIDE**2 / (2.0 * body.friction * body.gravity), _stop(body)
     blank, long = Answer("slide", "stopping distance", "m", speed=SLIDE, physical=free), f"more than {LONGEST_SLIDE:g} m: not simulated"
     if free > LONGEST_SLIDE:
         return [replace(blank, detail=long)]
     if not is_at_rest(body):
         return [replace(blank, direction=way, detail=MOVES) for way in WAYS]
     end = body.settled[-1:]
-    rests = [body.motions(end, dt, math.ceil(WATCHED / dt), -facts.gravity * UP, floor=True)[0, -1] for dt in dts]
+    rests = [body.motions(end, dt, math.ceil(WATCHED / dt), -body.gravity * UP, floor=True)[0, -1] for dt in dts]
     half = math.sqrt(0.5)
-    if any(_is_tipped(facts, end[0], np.array(direction)) for direction in ((1.0, 0.0, 0.0), (half, 0.0, half))):
+    if any(_is_tipped(body, end[0], np.array(direction)) for direction in ((1.0, 0.0, 0.0), (half, 0.0, half))):
         return [replace(blank, direction=way, detail=TIPS) for way in WAYS]
-    least = float(np.nanmin([facts.friction, facts.friction_across]))
-    longest = SLIDE**2 / (2.0 * LONGEST_SLIDE * facts.gravity)  # the friction of the longest slide
-    along = _stops(body, dts, rests, np.array([1.0, 0.0, 0.0]), facts.friction)
+    least = float(np.nanmin([body.friction, body.friction_across]))
+    longest = SLIDE**2 / (2.0 * LONGEST_SLIDE * body.gravity)  # the friction of the longest slide
+    along = _stops(body, dts, rests, np.array([1.0, 0.0, 0.0]), body.friction)
     across = _stops(body, dts, rests, np.array([half, 0.0, half]), max(least, longest))
     if not along or not across:
         return [replace(blank, direction=way, detail=TIPS) for way in WAYS]
     ways = zip(WAYS, (along, across), strict=True)
     answers = [judged(body, replace(blank, direction=way), dts, stops, [exact] * len(dts)) for way, stops in ways]
-    if not math.isnan(facts.friction_across):
+    if not math.isnan(body.friction_across):
         turned = replace(blank, direction=WAYS[1], physical=math.nan)
         return [answers[0], replace(turned, detail=long) if least < longest else replace(turned, measured=across[0])]
-    if SLIDE / (facts.friction * facts.gravity) < LONG_SLIDE:
+    if SLIDE / (body.friction * body.gravity) < LONG_SLIDE:
         answers = [_of_short_slide(one) for one in answers]
     return answers
 
@@ -70,12 +69,12 @@ def _of_short_slide(answer: Answer) -> Answer:
 
 def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direction: Array, friction: float) -> list[float]:
     """The distances in which a body that slides in a direction stops [m], with this friction or more; empty if it tips or rolls."""
-    facts, found = body.facts, []
+    found = []
     for dt, rest in zip(dts, rests, strict=True):
         start = rest.copy()
         start[VELOCITY], start[SPIN] = SLIDE * direction, 0.0
-        steps = math.ceil((1.5 * SLIDE / (friction * facts.gravity) + 0.1) / dt)
-        states = body.motions(start[np.newaxis], dt, steps, -facts.gravity * UP, floor=True)[0]
+        steps = math.ceil((1.5 * SLIDE / (friction * body.gravity) + 0.1) / dt)
+        states = body.motions(start[np.newaxis], dt, steps, -body.gravity * UP, floor=True)[0]
         if tilt(states) > UNTURNED:
             return []
         foot = unrotate(start[ORIENTATION], -start[1] * UP)  # a point of the body below its centre, which sways less
@@ -84,34 +83,34 @@ def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direct
     return found
 
 
-def _is_tipped(facts: Facts, rest: Array, direction: Array) -> bool:
+def _is_tipped(body: LooseBody, rest: Array, direction: Array) -> bool:
     """Whether friction turns a rigid body that slides in a direction over its leading edge: at first its weight has the shorter arm."""
     states = np.zeros((len(LEANING), 13))
     states[:, ORIENTATION] = multiply(about(np.cross(UP, direction), LEANING), rest[ORIENTATION])
-    height, leaning, further = -facts.lowest(states)  # of the centre of mass, which rises by the lever as the body leans, and falls
+    height, leaning, further = -body.lowest(states)  # of the centre of mass, which rises by the lever as the body leans, and falls
     lever = (further - leaning) / (LEANING[2] - LEANING[1]) + LEANING[1] * leaning
-    return bool(facts.friction * height > MARGINAL * lever)
+    return bool(body.friction * height > MARGINAL * lever)
 
 
-def _stop(facts: Facts) -> float:
+def _stop(body: LooseBody) -> float:
     """The exact distance in which friction and damping stop a body [m]: the integral of v over its deceleration."""
     nodes, weights = np.polynomial.legendre.leggauss(40)
     v = 0.5 * SLIDE * (1.0 + nodes)
-    dry = facts.friction * facts.mass * facts.gravity * (1.0 - facts.lifted)
-    force = dry + v * (facts.falls.linear + v * (facts.falls.quadratic + v * facts.falls.cubic))
-    return float(0.5 * SLIDE * weights @ ((facts.mass + facts.armature) * v / force))
+    dry = body.friction * body.mass * body.gravity * (1.0 - body.lifted)
+    force = dry + v * (body.falls.linear + v * (body.falls.quadratic + v * body.falls.cubic))
+    return float(0.5 * SLIDE * weights @ ((body.mass + body.armature) * v / force))
 
 
 def creep(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The speed of a body on a slope of half of its friction, which should hold it."""
-    facts, dt = body.facts, dts[0]
-    if not facts.lands or not facts.friction > 0.0 or _is_ball(facts):
+    dt = dts[0]
+    if not body.lands or not body.friction > 0.0 or _is_ball(body):
         return []
     answer = Answer("slide", "creep on a slope of half of the friction", "m/s", physical=0.0)
     if not is_at_rest(body):
         return [replace(answer, detail=MOVES)]
-    slope = math.atan(0.5 * facts.friction)
-    gravity = facts.gravity * np.array([math.sin(slope), -math.cos(slope), 0.0])
+    slope = math.atan(0.5 * body.friction)
+    gravity = body.gravity * np.array([math.sin(slope), -math.cos(slope), 0.0])
     start = body.settled[-1:].copy()
     start[:, VELOCITY] = start[:, SPIN] = 0.0
     states = body.motions(start, dt, math.ceil(1.0 / dt), gravity, floor=True)[0]
@@ -127,32 +126,31 @@ def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
 
     The second begins when the ball rolls without slip: above a soft surface, its speed is not that of its radius.
     """
-    facts = body.facts
-    if not facts.lands or not _is_ball(facts):
+    if not body.lands or not _is_ball(body):
         return []
     answer = Answer("roll", KEPT, "1", speed=1.0, physical=1.0)
     if not is_at_rest(body):
         return [replace(answer, detail=MOVES)]
-    radius, inertia = float(facts.colliding[0].shape.semi_axes[0]), float(facts.principal[0].mean())
+    radius, inertia = float(body.colliding[0].shape.semi_axes[0]), float(body.principal[0].mean())
     start = body.settled[-1:].copy()
     start[:, VELOCITY], start[:, SPIN] = [1.0, 0.0, 0.0], [0.0, 0.0, -1.0 / radius]
     kept, exact = [], []
-    heavy = facts.mass + facts.armature + (inertia + facts.armature) / radius**2
-    drag = (facts.falls.linear + facts.spins[0].linear / radius**2, facts.falls.quadratic + facts.spins[0].quadratic / radius**3)
+    heavy = body.mass + body.armature + (inertia + body.armature) / radius**2
+    drag = (body.falls.linear + body.spins[0].linear / radius**2, body.falls.quadratic + body.spins[0].quadratic / radius**3)
     for dt in dts:
         before, steps = round(WATCHED / dt), round(1.0 / dt)
-        states = body.motions(start, dt, before + steps, -facts.gravity * UP, floor=True)[0]
+        states = body.motions(start, dt, before + steps, -body.gravity * UP, floor=True)[0]
         first, last = (float(states[row][VELOCITY][0]) for row in (before, -1))
         rolls = abs(first) > STOPPED
         kept.append(last / first if rolls else 0.0)
         exact.append(float(spin_about_axis(1.0, first, heavy, 0.0, *drag)) / first if rolls else 0.0)
-    is_off_joint = facts.offset.any() and (facts.armature or any(drag))  # which act at the body's origin
-    if facts.rolling or not facts.friction or facts.falls.cubic or is_off_joint:
+    is_off_joint = body.offset.any() and (body.armature or any(drag))  # which act at the body's origin
+    if body.rolling or not body.friction or body.falls.cubic or is_off_joint:
         return [replace(answer, measured=kept[0])]
     return [judged(body, answer, dts, kept, exact)]
 
 
-def _is_ball(facts: Facts) -> bool:
+def _is_ball(body: LooseBody) -> bool:
     """Whether a body is a ball about its centre of mass, which rolls where others slide."""
-    parts = facts.colliding
+    parts = body.colliding
     return len(parts) == 1 and parts[0].shape.is_ball and float(np.abs(parts[0].position).max()) <= CENTRAL * parts[0].shape.size

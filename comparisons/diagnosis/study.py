@@ -37,7 +37,7 @@ READERS = {".xml": ("mujoco",), ".mjcf": ("mujoco",), ".urdf": ("mujoco", "pybul
 MESH = """<mujoco><asset><mesh name="mesh" file="{path}" inertia="{inertia}"/></asset><worldbody>
 <body name="{name}"><freejoint/><geom type="mesh" mesh="mesh" density="{density:g}"/></body></worldbody></mujoco>"""
 """A model with a body whose only geometry is a mesh."""
-OF_FACTS = ("name", "engine", "version", "dt", "mass", "surface", "friction", "friction_across")
+IN_FORCE = ("name", "engine", "version", "dt", "mass", "surface", "friction", "friction_across")
 """What a diagnosis has as an engine has it in force."""
 QUESTIONS: tuple[Question, ...] = (fall, spin, tumble, worst_tumble, impact, rest, slide, creep, roll)
 
@@ -244,22 +244,22 @@ def _diagnosed(
         body = _file(*given_to).body(name, on)
     except DropspinError as error:
         return DropspinError(str(error))
-    facts, known = body.facts, _known(*given_to, on, targets, questions)
+    known = _known(*given_to, on, targets, questions)
     key = body.likeness
     if key in known:
         return known[key]._replace(name=name)
-    answers = inertia(facts) + [answer for question in questions for answer in answers_to(question, body, targets)]
-    if facts.surface:
-        frictions = (facts.friction, facts.friction_across)
+    answers = inertia(body) + [answer for question in questions for answer in answers_to(question, body, targets)]
+    if body.surface:
+        frictions = (body.friction, body.friction_across)
         answers += [Answer("friction", COEFFICIENT, "1", measured=one) for one in frictions if not math.isnan(one)]
-    answers += [Answer("file", key, "", findings=(Finding("changed", (key,), detail=made),)) for key, _, made in facts.ignored]
+    answers += [Answer("file", key, "", findings=(Finding("changed", (key,), detail=made),)) for key, _, made in body.ignored]
     found = BodyDiagnosis(
-        **{field: getattr(facts, field) for field in OF_FACTS},
-        shapes=tuple(part.shape.shape for part in facts.colliding),
-        others=tuple(facts.others),
+        **{field: getattr(body, field) for field in IN_FORCE},
+        shapes=tuple(part.shape.shape for part in body.colliding),
+        others=tuple(body.others),
         answers=tuple(targets.judged(body, answers)),
-        settings={**facts.settings, **{key: setting for key, setting, _ in facts.ignored}},
-        unmodelled=tuple(facts.unmodelled),
+        settings={**body.settings, **{key: setting for key, setting, _ in body.ignored}},
+        unmodelled=tuple(body.unmodelled),
     )
     if key:
         known[key] = found

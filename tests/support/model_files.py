@@ -16,7 +16,7 @@ def body_of(tmp_path, world, option="", head="", name=None, on=None, file="model
 
 
 def ladder(body):
-    return [body.facts.dt, body.facts.dt / 2.0, body.facts.dt / 4.0]
+    return [body.dt, body.dt / 2.0, body.dt / 4.0]
 
 
 def by_quantity(answers):

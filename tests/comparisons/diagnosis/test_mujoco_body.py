@@ -22,16 +22,16 @@ def test_healthy_ball_has_no_finding(tmp_path):
     option = 'timestep="1e-3" integrator="RK4" cone="elliptic" impratio="100"'
     body = body_of(tmp_path, FREE.format('<geom size=".05"/>'), option)
     assert findings_of(body) == []
-    assert not any(answer.findings for answer in inertia(body.facts))
+    assert not any(answer.findings for answer in inertia(body))
 
 
 def test_damping_of_a_free_joint_is_named_and_its_time_constants_are_exact(tmp_path):
     world = '<body name="egg" pos="0 0 1"><joint type="free" damping="0.02"/><geom type="ellipsoid" size=".02 .03 .05"/></body>'
     body = body_of(tmp_path, world)
-    moments, mass = np.diag(body.facts.inertia), body.facts.mass
+    moments, mass = np.diag(body.inertia), body.mass
     answers = spin(body, ladder(body))
     assert [answer.in_force for answer in answers] == pytest.approx((moments / 0.02).tolist(), rel=1e-12)
-    h = body.facts.dt  # MuJoCo's implicit damper divides a spin by 1 + h/τ in each step
+    h = body.dt  # MuJoCo's implicit damper divides a spin by 1 + h/τ in each step
     assert [answer.measured for answer in answers] == pytest.approx([h / math.log1p(h * 0.02 / moment) for moment in moments], rel=1e-6)
     assert {tuple(finding.kind for finding in answer.findings) for answer in answers} == {("setting", "time step")}
     [fallen, terminal] = fall(body, ladder(body))
@@ -39,7 +39,7 @@ def test_damping_of_a_free_joint_is_named_and_its_time_constants_are_exact(tmp_p
     rate = 0.02 / mass
     assert fallen.in_force == pytest.approx(9.81 / rate * (1.0 - (1.0 - math.exp(-rate)) / rate), rel=1e-9)
     found = [(answer, finding) for answer, finding in findings_of(body) if finding.kind == "setting"]
-    assert {str(body.facts.settings[name]) for _, finding in found for name in finding.settings} == {'damping="0.02" (model.xml, line 1)'}
+    assert {str(body.settings[name]) for _, finding in found for name in finding.settings} == {'damping="0.02" (model.xml, line 1)'}
     assert {remedy.text for _, finding in found for remedy in finding.remedies} == {"<freejoint/> (model.xml, line 1)"}
     kept = [remedy.value for answer, finding in found for remedy in finding.remedies if answer.question == "spin"]
     assert kept == pytest.approx([1.0] * 3, rel=1e-9)
@@ -52,7 +52,7 @@ def test_armature_slows_the_fall_and_is_found_in_a_default_class(tmp_path):
     [answer] = fall(body, ladder(body))
     assert (answer.findings[0].kind, answer.findings[0].settings) == ("setting", ("armature",))
     assert answer.in_force == pytest.approx(0.5 * 9.81 / 1.5, rel=1e-9)
-    assert str(body.facts.settings["armature"]) == 'armature="0.5" (model.xml, line 3)'
+    assert str(body.settings["armature"]) == 'armature="0.5" (model.xml, line 3)'
 
 
 @pytest.mark.extended
@@ -106,7 +106,7 @@ def test_margin_lifts_a_body(tmp_path):
 
 def test_default_contact_returns_the_speed_of_a_critically_damped_spring(tmp_path):
     body = body_of(tmp_path, FREE.format('<geom size=".05"/>'), 'timestep="1e-4"')
-    answers = {answer.quantity: answer for answer in impact(body, [body.facts.dt]) if answer.speed == 1.0}
+    answers = {answer.quantity: answer for answer in impact(body, [body.dt]) if answer.speed == 1.0}
     assert answers["largest upward / impact speed"].measured == pytest.approx(math.exp(-2.0), abs=0.02)  # without gravity
     assert answers[REBOUND].measured == 0.0
     assert answers["contact"].detail == "> 0.3 s"
@@ -122,7 +122,7 @@ def test_coarse_step_scatters_the_rebound_over_start_phases(tmp_path):
 
 def test_raised_time_constant_of_a_contact_is_said(tmp_path):
     body = body_of(tmp_path, FREE.format('<geom size=".05" solref="0.001 1" priority="1"/>'))
-    [(name, setting, made)] = body.facts.ignored
+    [(name, setting, made)] = body.ignored
     assert (name, setting.text) == ("solref", 'solref="0.001 1"')
     assert made == "raised to a time constant of 0.004 s, two time steps"
 
@@ -132,7 +132,7 @@ def test_pyramid_is_named_where_friction_depends_on_direction(tmp_path):
         '<geom name="table" type="box" size="1 1 .2" pos="5 0 .2" friction=".1"/>'
     )
     body = body_of(tmp_path, world, on="table")
-    assert body.facts.friction == pytest.approx(0.3)
+    assert body.friction == pytest.approx(0.3)
     along, diagonal = answers_to(slide, body)
     assert along.findings == ()
     assert along.in_force == pytest.approx(0.25 / (2.0 * 0.3 * 9.81))
@@ -145,7 +145,7 @@ def test_pyramid_is_named_where_friction_depends_on_direction(tmp_path):
 def test_impossible_inertia_is_measured_against_the_shape(tmp_path):
     inertial = '<inertial pos="0 0 0" mass=".1" diaginertia="1e5 1e5 1e5"/>'
     body = body_of(tmp_path, FREE.format(f'{inertial}<geom type="box" size=".015 .015 .12"/>'))
-    answer = by_quantity(inertia(body.facts))["largest moment / largest possible"]
+    answer = by_quantity(inertia(body))["largest moment / largest possible"]
     assert [finding.kind for finding in answer.findings] == ["impossible"]
     assert answer.measured == pytest.approx(1e5 / (0.1 * (0.015**2 + 0.12**2)), rel=1e-9)
 
@@ -154,10 +154,10 @@ def test_compilers_change_of_an_inertia_is_said(tmp_path):
     inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 2.5"/>'
     world = FREE.format(f'{inertial}<geom type="box" size="2 2 2"/>')
     body = body_of(tmp_path, world, head='<compiler balanceinertia="true"/>')
-    [(name, setting, made)] = body.facts.ignored
+    [(name, setting, made)] = body.ignored
     assert (name, setting.text) == ("inertia", 'diaginertia="1 1 2.5"')
     assert 'balanceinertia="true" (model.xml, line 1)' in made
-    assert by_quantity(inertia(body.facts))["largest moment / sum of others"].measured == pytest.approx(1.25)
+    assert by_quantity(inertia(body))["largest moment / sum of others"].measured == pytest.approx(1.25)
 
 
 def test_root_of_a_urdf_is_welded_and_cut_loose(tmp_path):
@@ -165,10 +165,10 @@ def test_root_of_a_urdf_is_welded_and_cut_loose(tmp_path):
     link = f'<contact><restitution value="0.5"/></contact><inertial><mass value="1"/>{tensor}</inertial>'
     shape = '<collision><geometry><sphere radius="0.5"/></geometry></collision>'
     body = body_of(tmp_path, f'<robot name="r"><link name="ball">{link}{shape}</link></robot>', file="ball.urdf")
-    assert [name for name, *_ in body.facts.ignored] == ["base", "restitution"]
-    assert body.facts.unmodelled == []
-    assert body.facts.surface == "a plane with default settings"
-    assert np.diag(body.facts.inertia) == pytest.approx([0.1] * 3)
+    assert [name for name, *_ in body.ignored] == ["base", "restitution"]
+    assert body.unmodelled == []
+    assert body.surface == "a plane with default settings"
+    assert np.diag(body.inertia) == pytest.approx([0.1] * 3)
 
 
 def test_link_of_a_urdf_lands_on_the_plane_that_is_added_and_not_on_the_root(tmp_path):
@@ -177,13 +177,13 @@ def test_link_of_a_urdf_lands_on_the_plane_that_is_added_and_not_on_the_root(tmp
     link = f'<link name="{{}}">{mass}<collision><origin rpy="0 .4 0"/><geometry><box size=".1 .1 .1"/></geometry></collision></link>'
     joint = '<joint name="j" type="continuous"><parent link="base"/><child link="arm"/><origin xyz="0 0 .2"/><axis xyz="0 0 1"/></joint>'
     text = f'<robot name="r">{link.format("base")}{link.format("arm")}{joint}</robot>'
-    facts = body_of(tmp_path, text, name="arm", file="arm.urdf").facts
-    assert (facts.surface, facts.unmodelled) == ("a plane with default settings", ["joints"])
+    body = body_of(tmp_path, text, name="arm", file="arm.urdf")
+    assert (body.surface, body.unmodelled) == ("a plane with default settings", ["joints"])
     arm = '<body name="arm" pos="0 0 .2"><joint/><geom type="box" size=".1 .1 .1"/></body>'
     (tmp_path / "arm.xml").write_text(
         f'<mujoco><worldbody><body name="base"><geom name="foot" type="box" size=".1 .1 .1"/>{arm}</body></worldbody></mujoco>'
     )
-    assert MuJoCoModel(tmp_path / "arm.xml", "arm.xml").body("arm", None).facts.surface == "foot"
+    assert MuJoCoModel(tmp_path / "arm.xml", "arm.xml").body("arm", None).surface == "foot"
 
 
 def test_welded_parts_and_an_offset_centre_move_as_in_mujoco(tmp_path):
@@ -195,7 +195,7 @@ def test_welded_parts_and_an_offset_centre_move_as_in_mujoco(tmp_path):
 
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "model.xml"))
     data = mujoco.MjData(model)
-    start = body.facts.start(height=5.0, velocity=np.array([0.3, 0.1, 0.2]), spin=np.array([1.0, 2.0, 3.0]))
+    start = body.start(height=5.0, velocity=np.array([0.3, 0.1, 0.2]), spin=np.array([1.0, 2.0, 3.0]))
     motion = body.motions(start[np.newaxis], 2e-3, 200, np.array([0.0, -9.81, 0.0]), floor=False)[0]
     data.qvel[3:6] = [1.0, 2.0, 3.0]
     mujoco.mj_forward(model, data)
@@ -207,7 +207,7 @@ def test_welded_parts_and_an_offset_centre_move_as_in_mujoco(tmp_path):
     mujoco.mj_forward(model, data)
     x, y, z = data.subtree_com[1] - first
     assert (motion[-1] - motion[0])[:3] == pytest.approx([x, z, -y], abs=1e-12)
-    exact = body.facts.in_force(start, np.array([0.0, 0.4]), 9.81)[-1]
+    exact = body.in_force(start, np.array([0.0, 0.4]), 9.81)[-1]
     finer = body.motions(start[np.newaxis], 1e-4, 4000, np.array([0.0, -9.81, 0.0]), floor=False)[0, -1]
     assert finer == pytest.approx(exact, abs=2e-3)
 
@@ -245,12 +245,12 @@ def test_fluid_and_wind_act_as_in_mujoco_and_are_named(tmp_path):
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "model.xml"))
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 200)
-    along = body.motions(body.facts.start()[np.newaxis], 0.002, 200, -9.81 * UP, floor=False)[0]
+    along = body.motions(body.start()[np.newaxis], 0.002, 200, -9.81 * UP, floor=False)[0]
     x, _, z = data.qpos[:3] - [0.0, 0.0, 1.0]
     assert abs(x) > 0.1
     assert along[-1, POSITION] - along[0, POSITION] == pytest.approx([x, z, 0.0], abs=1e-9)
     found = {answer.question: finding for answer, finding in findings_of(body)}
-    assert str(body.facts.settings[found["fall"].settings[0]]) == 'density="1.2" (model.xml, line 1)'
+    assert str(body.settings[found["fall"].settings[0]]) == 'density="1.2" (model.xml, line 1)'
     [remedy] = found["fall"].remedies
     assert remedy.text == '<option density="0" wind="3 0 1" viscosity="0"/> (model.xml, line 1)'
     assert remedy.value == pytest.approx(4.905, rel=3e-3)
@@ -270,8 +270,8 @@ def test_friction_of_a_urdf_is_not_read(tmp_path):
     shape = '<collision><geometry><box size=".1 .1 .1"/></geometry></collision>'
     mass = '<inertial><mass value="1"/><inertia ixx=".002" iyy=".002" izz=".002" ixy="0" ixz="0" iyz="0"/></inertial>'
     body = body_of(tmp_path, f'<robot name="r"><link name="l">{contact}{mass}{shape}</link></robot>', file="model.urdf")
-    assert body.facts.friction == 1.0
-    assert [name for name, _, made in body.facts.ignored if made == "not read"] == ["lateral_friction", "inertia_scaling"]
+    assert body.friction == 1.0
+    assert [name for name, _, made in body.ignored if made == "not read"] == ["lateral_friction", "inertia_scaling"]
 
 
 def test_settings_of_contacts_that_neither_engine_reads_are_named(tmp_path):
@@ -287,8 +287,8 @@ def test_settings_of_contacts_that_neither_engine_reads_are_named(tmp_path):
     joints = joint.format("fixed", "fixed") + joint.format("continuous", "arm")
     gazebo = "<gazebo reference='{}'>\n<mu1>.2</mu1><contact_cfm/><material>Gazebo/Red</material></gazebo>"
     text = f'<robot name="r">{links}{joints}{gazebo.format("base")}{gazebo.format("arm")}<gazebo><kp>1e6</kp></gazebo></robot>'
-    of_mujoco = body_of(tmp_path, text, name="base", file="model.urdf").facts.ignored
-    of_pybullet = PyBulletModel(tmp_path / "model.urdf", "model.urdf").body("base", None).facts.ignored
+    of_mujoco = body_of(tmp_path, text, name="base", file="model.urdf").ignored
+    of_pybullet = PyBulletModel(tmp_path / "model.urdf", "model.urdf").body("base", None).ignored
     for ignored in (of_mujoco, of_pybullet):
         found = [(name, setting.text, setting.line) for name, setting, made in ignored if made == "not read"]
         drake_of_fixed = ("drake:mu_static of fixed", '<drake:mu_static value=".6">', 1)
@@ -358,10 +358,10 @@ def test_tied_body_is_not_free_and_what_acts_on_a_body_is_named(tmp_path):
     (tmp_path / "tied.xml").write_text(text)
     model = MuJoCoModel(tmp_path / "tied.xml", "tied.xml")
     assert model.bodies([], False) == ["b", "c"]
-    left_out = {name: model.body(name, None).facts.unmodelled for name in "abc"}
+    left_out = {name: model.body(name, None).unmodelled for name in "abc"}
     assert left_out == {"a": ["equality constraints"], "b": ["the pose of keyframe turned"], "c": ["tendons"]}
-    assert model.body("b", None).facts.others == ["box"]
-    assert model.body("b", "box").facts.others == []
+    assert model.body("b", None).others == ["box"]
+    assert model.body("b", "box").others == []
 
 
 def test_settings_for_a_restitution_are_tried(tmp_path):
@@ -383,7 +383,7 @@ def test_lowest_points_of_turned_round_shapes_are_exact(tmp_path):
         up = body._file.data.geom_xmat[number].reshape(3, 3)[2]  # the vertical in the frame of the geometry
         sizes = body._file.model.geom_size[number]
         height = np.linalg.norm(sizes * up) if "ellipsoid" in geom else sizes[1] * abs(up[2]) + sizes[0] * math.hypot(up[0], up[1])
-        assert body.facts.start()[1] == pytest.approx(height, rel=1e-12)
+        assert body.start()[1] == pytest.approx(height, rel=1e-12)
 
 
 def test_equal_bodies_are_alike_and_others_are_not(tmp_path):

@@ -54,8 +54,8 @@ def test_ground_that_is_neither_plane_nor_box_is_named_and_targets_are_not_judge
 
 def test_plane_counts_and_not_what_else_of_the_world_a_body_collides_with(tmp_path):
     body = body_of(tmp_path, GROUNDS["the cylinder table"] + BALL.format(""))
-    assert (body.facts.surface, body.facts.unmodelled, body.facts.left_out) == ("floor", [], "")
-    targets = list(Targets(None, 1.0).judged(body, [Answer("friction", COEFFICIENT, "1", measured=body.facts.friction)]))
+    assert (body.surface, body.unmodelled, body.left_out) == ("floor", [], "")
+    targets = list(Targets(None, 1.0).judged(body, [Answer("friction", COEFFICIENT, "1", measured=body.friction)]))
     assert [finding for answer in targets for finding in answer.findings] == []
 
 
@@ -63,14 +63,14 @@ def test_settings_of_a_contact_are_those_of_the_larger_priority(tmp_path):
     """MuJoCo raises the time constant of the table, not that of the cube, and has its friction."""
     table = '<geom name="t" type="plane" size="1 1 .1" pos="0 0 .2" priority="2" solref="0.002 1" friction=".3 .05 .01"/>'
     cube = FREE.format('<geom type="box" size=".1 .1 .1" mass="1" solref="0.02 1" friction="0.9 .01 .001"/>')
-    ignored = {name: (setting.text, made) for name, setting, made in body_of(tmp_path, table + cube, on="t").facts.ignored}
+    ignored = {name: (setting.text, made) for name, setting, made in body_of(tmp_path, table + cube, on="t").ignored}
     assert ignored["solref"] == ('solref="0.002 1"', "raised to a time constant of 0.004 s, two time steps")
     assert ignored["friction"][0] == 'friction=".3 .05 .01"'
 
 
 def test_friction_of_a_contact_without_friction_is_not_used(tmp_path):
     ball = FREE.format('<geom size=".1" mass="1" condim="1" priority="1" friction="0.9 .01 .001"/>')
-    made = [made for name, _, made in body_of(tmp_path, ball).facts.ignored if name == "friction"]
+    made = [made for name, _, made in body_of(tmp_path, ball).ignored if name == "friction"]
     assert made == ["not used: condim is 1"]
 
 
@@ -95,7 +95,7 @@ def test_slide_between_directions_of_different_friction_is_followed_to_its_end(t
     data = mujoco.MjData(model := mujoco.MjModel.from_xml_path(str(tmp_path / "model.xml")))
     data.qvel[:2] = 0.5 * np.sqrt(0.5)
     mujoco.mj_step(model, data, 1000)
-    [stopped] = [answer.measured for answer in slide(body, [body.facts.dt]) if answer.direction == "45°"]
+    [stopped] = [answer.measured for answer in slide(body, [body.dt]) if answer.direction == "45°"]
     assert stopped == pytest.approx(np.hypot(*data.qpos[:2]), rel=0.01)
 
 
@@ -157,7 +157,7 @@ def test_remedy_that_misses_a_target_that_was_met_is_not_given(tmp_path):
 def test_moments_that_are_each_possible_but_not_together_are_named(tmp_path):
     """Of a plate of 2 mm: z² mass of (Ixx + Iyy - Izz)/2 = 5e-4 kg m², and at most m c² = 1e-6 kg m²."""
     inertial = '<inertial pos="0 0 0" mass="1" diaginertia="0.003 0.003 0.005"/><geom type="box" size=".1 .1 .001"/>'
-    [answer] = [answer for answer in inertia(body_of(tmp_path, FREE.format(inertial)).facts) if answer.findings]
+    [answer] = [answer for answer in inertia(body_of(tmp_path, FREE.format(inertial))) if answer.findings]
     assert answer.quantity == "second moments / largest possible"
     assert answer.measured == pytest.approx(500.0, rel=0.01)
 

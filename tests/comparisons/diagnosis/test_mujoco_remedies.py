@@ -58,7 +58,7 @@ def test_remedy_of_a_margin_names_all_geometries_that_it_is_tried_on(tmp_path):
 
 def test_free_joint_keeps_its_name(tmp_path):
     body = body_of(tmp_path, f'<body name="b"><joint name="root" type="free" damping=".02"/>{BOX.format("")}</body>')
-    assert body.patch(body.remedies["damping"], body.facts.dt).startswith('<freejoint name="root"/>')
+    assert body.patch(body.remedies["damping"], body.dt).startswith('<freejoint name="root"/>')
 
 
 def test_option_of_a_urdf_goes_into_its_element(tmp_path):
@@ -66,14 +66,14 @@ def test_option_of_a_urdf_goes_into_its_element(tmp_path):
     link = f'<link name="b">{mass}<collision><geometry><box size="1 1 1"/></geometry></collision></link>'
     text = f'<robot name="r"><mujoco><compiler discardvisual="false"/></mujoco>{link}</robot>'
     body = body_of(tmp_path, text, file="model.urdf")
-    assert body.patch({"cone": "elliptic"}, body.facts.dt) == '<option cone="elliptic"/> within <mujoco> (model.urdf, line 1)'
+    assert body.patch({"cone": "elliptic"}, body.dt) == '<option cone="elliptic"/> within <mujoco> (model.urdf, line 1)'
     bare = body_of(tmp_path, f'<robot name="r">{link}</robot>', file="model.urdf")
-    assert bare.patch({"cone": "elliptic"}, bare.facts.dt) == '<mujoco><option cone="elliptic"/></mujoco>'
+    assert bare.patch({"cone": "elliptic"}, bare.dt) == '<mujoco><option cone="elliptic"/></mujoco>'
 
 
 def test_second_number_of_five_frictions_is_sliding(tmp_path):
     head = '<option o_friction=".2 .2 .005 .0001 .0001"><flag override="enable"/></option>'
-    assert [name for name, _, _ in body_of(tmp_path, FREE.format(BOX.format("")), head=head).facts.ignored] == []
+    assert [name for name, _, _ in body_of(tmp_path, FREE.format(BOX.format("")), head=head).ignored] == []
 
 
 def test_mesh_that_is_counted_twice_is_the_bodys(tmp_path):
@@ -84,7 +84,7 @@ def test_mesh_that_is_counted_twice_is_the_bodys(tmp_path):
     faces += [face for n in range(6) for m in [(n + 1) % 6] for face in ((n, m, m + 6), (n, m + 6, n + 6))]
     face = " ".join(str(one) for face in faces for one in face)
     head = f'<asset><mesh name="a" vertex="{corners}"/><mesh name="L" vertex="{vertices}" face="{face}"/></asset>'
-    [(_, setting, _)] = body_of(tmp_path, FREE.format('<geom type="mesh" mesh="L"/>'), head=head).facts.ignored
+    [(_, setting, _)] = body_of(tmp_path, FREE.format('<geom type="mesh" mesh="L"/>'), head=head).ignored
     assert 'name="L"' in setting.text
 
 

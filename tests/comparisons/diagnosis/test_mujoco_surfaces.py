@@ -36,8 +36,8 @@ def on(tmp_path, world, height=1.0, option="", geom=BOX):
     ],
 )
 def test_body_lands_on_what_is_below_it(tmp_path, world, height, option, surface, left_out):
-    facts = on(tmp_path, world, height, option).facts
-    assert (facts.surface, facts.unmodelled) == (surface, left_out)
+    body = on(tmp_path, world, height, option)
+    assert (body.surface, body.unmodelled) == (surface, left_out)
 
 
 def test_plane_that_is_added_has_mujocos_own_settings_not_those_of_the_default_class(tmp_path):
@@ -46,14 +46,14 @@ def test_plane_that_is_added_has_mujocos_own_settings_not_those_of_the_default_c
     body = f'<body name="b" pos="0 0 1"><freejoint/>{geom}</body>'
     (tmp_path / "model.xml").write_text(f"<mujoco>{of_class}<worldbody>{body}</worldbody></mujoco>")
     body = MuJoCoModel(tmp_path / "model.xml", "model.xml").body("b", None)
-    assert (body.facts.surface, body.facts.friction) == ("a plane with default settings", 1.0)
-    assert rest(body, ladder(body)[:1])[0].measured == pytest.approx(body.facts.rest_depth, rel=1e-3)
+    assert (body.surface, body.friction) == ("a plane with default settings", 1.0)
+    assert rest(body, ladder(body)[:1])[0].measured == pytest.approx(body.rest_depth, rel=1e-3)
 
 
 def test_margin_of_the_floor_is_not_that_of_a_body_that_has_none(tmp_path):
     body = on(tmp_path, FLOOR.replace("/>", ' margin=".02"/>'), geom=BOX.replace("/>", ' margin="0"/>'))
     [(_, found)] = findings_of(body, rest)
-    assert body.facts.settings["margin"].text == 'margin=".02"'
+    assert body.settings["margin"].text == 'margin=".02"'
     assert found.remedies[0].text == '<geom name="floor" type="plane" size="0 0 1" margin="0"/> (model.xml, line 1)'
 
 
@@ -78,7 +78,7 @@ def test_part_that_hangs_beside_its_support_is_no_penetration(tmp_path):
     body = on(tmp_path, post, geom=f'<geom type="box" size=".2 .2 .01" pos="0 0 .01"/>{skirts}')
     depth = rest(body, ladder(body)[:1])[0]
     assert 0.0 < depth.measured < 1e-3
-    assert body.facts.unmodelled == []
+    assert body.unmodelled == []
 
 
 def test_beam_of_a_mesh_rests_on_a_table_without_jitter(tmp_path):
@@ -90,5 +90,5 @@ def test_beam_of_a_mesh_rests_on_a_table_without_jitter(tmp_path):
     (tmp_path / "model.xml").write_text(f"<mujoco>{mesh}<worldbody>{table}{body}</worldbody></mujoco>")
     beam = MuJoCoModel(tmp_path / "model.xml", "model.xml").body("b", None)
     depth, drift = rest(beam, ladder(beam)[:1])[:2]
-    assert depth.measured == pytest.approx(beam.facts.rest_depth, rel=1e-3)
+    assert depth.measured == pytest.approx(beam.rest_depth, rel=1e-3)
     assert drift.measured < 1e-8

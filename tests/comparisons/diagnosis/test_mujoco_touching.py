@@ -16,17 +16,17 @@ SPRING = {"solref": "0 -750", "solimp": "0.9999 0.9999 0.001 0.5 2"}
 
 def test_settings_are_those_of_the_geometry_that_touches(tmp_path):
     body = body_of(tmp_path, FREE.format(LID + SOLE.format('friction="2" margin=".01"')))
-    assert (body.facts.friction, body.facts.margin) == (2.0, 0.01)
+    assert (body.friction, body.margin) == (2.0, 0.01)
     [(_, found)] = findings_of(body, rest)
     assert [remedy.text.split()[1] for remedy in found.remedies] == ['name="sole"']
-    assert body.patch(SPRING, body.facts.dt).startswith('<geom name="sole"')
+    assert body.patch(SPRING, body.dt).startswith('<geom name="sole"')
 
 
 def test_geometries_of_different_friction_that_touch_together_have_none_in_common(tmp_path):
     feet = "".join(f'<geom name="f{y}" size=".05" pos="0 {y} 0" friction="{2 + y}"/>' for y in (-1, 0, 1))
-    facts = body_of(tmp_path, FREE.format(feet)).facts
-    assert math.isnan(facts.friction)
-    assert facts.unmodelled == ["a slide on geometries of different friction (f-1, f0, f1)"]
+    body = body_of(tmp_path, FREE.format(feet))
+    assert math.isnan(body.friction)
+    assert body.unmodelled == ["a slide on geometries of different friction (f-1, f0, f1)"]
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_remedy_of_a_contact_is_in_force_and_keeps_friction(tmp_path, floor, geo
     """The remedy written into the file: what MuJoCo then mixes of both geometries."""
     ground = f'<geom name="ground" type="box" size="9 9 .1" {floor}/>'
     body = body_of(tmp_path, ground + FREE.format(f'<geom name="g" type="box" size=".1 .1 .04" {geom}/>'), on="ground")
-    patched = body.patch(SPRING, body.facts.dt).rpartition(" (")[0]
+    patched = body.patch(SPRING, body.dt).rpartition(" (")[0]
     other = body_of(tmp_path, ground + FREE.format(patched), on="ground")
     [before], [after] = body._touching.values(), other._touching.values()
     assert after["solref"] == pytest.approx([0, -750])
@@ -53,28 +53,28 @@ def test_remedy_of_a_contact_is_in_force_and_keeps_friction(tmp_path, floor, geo
 def test_settings_and_remedies_of_a_pair_are_its_own(tmp_path):
     pair = '<contact><pair geom1="floor" geom2="g" margin=".01" solref="0.001 1"/></contact>'
     body = body_of(tmp_path, FREE.format('<geom name="g" size=".05" margin=".001" solref="0.05 1"/>'), head=pair)
-    assert body.facts.settings["solref"].text == 'solref="0.001 1"'
-    assert body.patch({"margin": 0.0}, body.facts.dt).startswith('<pair geom1="floor" geom2="g" margin="0"')
-    assert body.patch(SPRING, body.facts.dt).startswith('<pair geom1="floor" geom2="g" margin=".01" solref="0 -750"')
+    assert body.settings["solref"].text == 'solref="0.001 1"'
+    assert body.patch({"margin": 0.0}, body.dt).startswith('<pair geom1="floor" geom2="g" margin="0"')
+    assert body.patch(SPRING, body.dt).startswith('<pair geom1="floor" geom2="g" margin=".01" solref="0 -750"')
 
 
 def test_inertial_of_a_child_is_not_its_parents(tmp_path):
     arm = '<body pos=".2 0 0"><joint/><inertial pos="0 0 0" mass="2" diaginertia="5 5 5"/></body>'
     body = body_of(tmp_path, FREE.format(f'<geom type="box" size=".1 .1 .04"/>{arm}'), name="b")
-    assert body.facts.written.inertia.max() < 1.0
-    assert "inertia" not in body.facts.settings
+    assert body.written.inertia.max() < 1.0
+    assert "inertia" not in body.settings
 
 
 def test_geometry_and_joint_within_frames_have_their_lines(tmp_path):
     world = '<body name="b" pos="0 0 1">\n<frame><joint type="free" damping=".1"/>\n<geom size=".05" margin=".004"/></frame></body>'
-    settings = body_of(tmp_path, world).facts.settings
+    settings = body_of(tmp_path, world).settings
     assert (settings["damping"].line, settings["margin"].line) == (2, 3)
 
 
 def test_settings_of_all_sections_of_defaults_are_found(tmp_path):
     """As an included file may bring one more; of several, MuJoCo takes the last value."""
     one, other = '<default><geom margin=".002" solimp=".8 .9 .001"/></default>', '<default><geom margin=".001"/><site size=".1"/></default>'
-    settings = body_of(tmp_path, FREE.format(LID), head=one + other).facts.settings
+    settings = body_of(tmp_path, FREE.format(LID), head=one + other).settings
     assert {name: settings[name].text for name in ("margin", "solimp")} == {"margin": 'margin=".001"', "solimp": 'solimp=".8 .9 .001"'}
 
 
@@ -83,7 +83,7 @@ def test_gravcomp_of_a_welded_part_lifts_its_own_weight(tmp_path):
     body = body_of(tmp_path, FREE.format(f'<geom type="box" size=".1 .1 .04" mass="1"/>{part}'))
     [(answer, found)] = findings_of(body, fall)
     assert answer.in_force == pytest.approx(0.25 * 9.81)
-    assert (found.kind, body.facts.settings["gravcomp"].text) == ("setting", 'gravcomp="1"')
+    assert (found.kind, body.settings["gravcomp"].text) == ("setting", 'gravcomp="1"')
     assert found.remedies[0].text == '<body name="w" gravcomp="0"> (model.xml, line 1)'
 
 
@@ -92,13 +92,13 @@ def test_body_that_does_not_fall_has_answers_that_say_so(tmp_path, gravcomp):
     body = body_of(tmp_path, FREE.replace("<body", f'<body gravcomp="{gravcomp}"').format(LID))
     found = {answer.quantity: answer for answer, _ in findings_of(body, *QUESTIONS)}
     assert found["distance in 1 s"].in_force == pytest.approx((1 - gravcomp) * 0.5 * 9.81)
-    assert math.isnan(body.facts.rest_depth)
+    assert math.isnan(body.rest_depth)
 
 
 @pytest.mark.parametrize(("wind", "is_known"), [("0 0 0", True), ("2 0 0", False)])
 def test_depth_at_rest_is_not_known_in_wind(tmp_path, wind, is_known):
     """Air at rest exerts no force on a body at rest."""
-    depth = body_of(tmp_path, FREE.format(LID), f'density="1.2" wind="{wind}"').facts.rest_depth
+    depth = body_of(tmp_path, FREE.format(LID), f'density="1.2" wind="{wind}"').rest_depth
     assert math.isfinite(depth) == is_known
 
 
@@ -107,6 +107,6 @@ def test_sleep_is_a_setting_with_a_remedy(tmp_path):
     body = body_of(tmp_path, FREE.format(LID), head=flag)
     [(answer, found)] = findings_of(body, fall)
     assert answer.in_force == pytest.approx(0.5 * 9.81)
-    assert (found.kind, [body.facts.settings[name].text for name in found.settings]) == ("setting", ['sleep="enable"'])
+    assert (found.kind, [body.settings[name].text for name in found.settings]) == ("setting", ['sleep="enable"'])
     assert found.remedies[0].value == pytest.approx(0.5 * 9.81, rel=3e-3)
     assert 'sleep_tolerance="0"' in found.remedies[0].text

@@ -43,13 +43,13 @@ def test_the_default_damping_slows_fall_and_spin_as_the_closed_forms_say(tmp_pat
         assert (answer.findings[0].kind, answer.findings[0].settings) == ("setting", ("damping",))
     [of_tumble, _] = tumble(block, DTS)
     assert of_tumble.limit == pytest.approx(of_tumble.in_force, rel=1e-5)
-    end = block.motions(block.facts.start()[np.newaxis], 0.01, 1000, -9.81 * UP, floor=False)[0, -1]
+    end = block.motions(block.start()[np.newaxis], 0.01, 1000, -9.81 * UP, floor=False)[0, -1]
     assert -end[VELOCITY][1] == pytest.approx(terminal.in_force, rel=1e-4)
 
 
 def test_a_motion_is_that_of_pybullet_alone(tmp_path):
     block = body(tmp_path, link(BOX, "0.05"))
-    start = block.facts.start(velocity=np.array([1.0, 2.0, 3.0]), spin=np.array([3.0, 4.0, 5.0]))
+    start = block.start(velocity=np.array([1.0, 2.0, 3.0]), spin=np.array([3.0, 4.0, 5.0]))
     states = block.motions(start[np.newaxis], DTS[0], 240, -9.81 * UP, floor=False)[0]
     import pybullet
 
@@ -66,14 +66,13 @@ def test_a_motion_is_that_of_pybullet_alone(tmp_path):
 
 def test_links_that_are_fixed_to_each_other_are_one_body(tmp_path):
     both = two_links(tmp_path)
-    facts = both.facts
-    assert facts.mass == pytest.approx(3.0)
-    start = facts.start(velocity=np.array([1.0, 2.0, 3.0]), spin=np.array([3.0, 4.0, 5.0]))
+    assert both.mass == pytest.approx(3.0)
+    start = both.start(velocity=np.array([1.0, 2.0, 3.0]), spin=np.array([3.0, 4.0, 5.0]))
     [[again]] = both.motions(start[np.newaxis], DTS[0], 0, np.zeros(3), floor=False)
     np.testing.assert_allclose(again, start, atol=1e-15)
 
     def momentum(state):
-        return rotate(state[ORIENTATION], facts.inertia @ unrotate(state[ORIENTATION], state[SPIN]))
+        return rotate(state[ORIENTATION], both.inertia @ unrotate(state[ORIENTATION], state[SPIN]))
 
     free, errors = both.changed({"damping": 0.0}), []
     for dt in (1e-3, 5e-4):
@@ -90,34 +89,34 @@ def test_links_that_are_fixed_to_each_other_are_one_body(tmp_path):
 
 def test_an_inertia_that_is_not_in_force_is_named(tmp_path):
     block = body(tmp_path, link(BOX, "0.05", (1.0, 1.0, 1.0)))
-    np.testing.assert_allclose(block.facts.principal[0], [0.05 / 12 * s for s in (0.0034, 0.0234, 0.025)])
-    [(name, setting, made)] = block.facts.ignored
+    np.testing.assert_allclose(block.principal[0], [0.05 / 12 * s for s in (0.0034, 0.0234, 0.025)])
+    [(name, setting, made)] = block.ignored
     assert (name, setting.file, setting.line) == ("inertia", "model.urdf", 1)
     assert made == "replaced by that of the bounding box of the collision geometry: 1.42e-05, 9.75e-05, 0.000104 kg m²"
-    assert named(inertia(block.facts), "largest moment / largest possible").measured == pytest.approx(3200.0)
-    np.testing.assert_allclose(block.changed({"inertia": "file"}).facts.inertia, np.eye(3))
+    assert named(inertia(block), "largest moment / largest possible").measured == pytest.approx(3200.0)
+    np.testing.assert_allclose(block.changed({"inertia": "file"}).inertia, np.eye(3))
     same = body(tmp_path, link(BOX, "1", (0.0034 / 12, 0.0234 / 12, 0.025 / 12)))
-    assert same.facts.ignored == []
+    assert same.ignored == []
     turned = body(tmp_path, link(BOX, "1", (1e-3, 2e-3, 2.5e-3), at='<origin xyz=".1 0 0" rpy="0 0 1.5707963267948966"/>'))
-    np.testing.assert_allclose(turned.facts.written.inertia, np.diag([2e-3, 1e-3, 2.5e-3]), atol=1e-9)
-    answers = inertia(body(tmp_path, link(BOX, "1", (1e-3, 1e-3, 2.5e-3))).facts)
+    np.testing.assert_allclose(turned.written.inertia, np.diag([2e-3, 1e-3, 2.5e-3]), atol=1e-9)
+    answers = inertia(body(tmp_path, link(BOX, "1", (1e-3, 1e-3, 2.5e-3))))
     assert named(answers, "largest moment / sum of others").measured == pytest.approx(1.25)
 
 
 def test_displacement_of_a_centre_of_mass_has_no_digits_of_rounding(tmp_path):
     """The inertial frame is turned by 0.5 rad, so that a displacement without y has y = 3e-17 m."""
     off = body(tmp_path, link('<box size=".1 .1 .1"/>', at='<origin xyz=".2 0 0" rpy="0 0 .5"/>', moments=(0.00167, 0.002, 0.003)))
-    [answer] = [answer for answer in inertia(off.facts) if answer.findings]
+    [answer] = [answer for answer in inertia(off) if answer.findings]
     assert "displaced by (-0.2, 0, 0) m" in answer.findings[0].remedies[0].text
 
 
 def test_restitution_is_the_product_with_that_of_the_plane(tmp_path):
     ball = body(tmp_path, link(BALL, extra='<contact>\n<restitution value="0.5"/></contact>'))
-    assert ball.facts.restitution == 0.0
-    [(name, setting, made)] = ball.facts.ignored
+    assert ball.restitution == 0.0
+    [(name, setting, made)] = ball.ignored
     assert (name, str(setting)) == ("restitution", '<restitution value="0.5"> (model.urdf, line 2)')
     assert made == "0, the product with the restitution 0 of plane.urdf"
-    assert ball.changed({"restitution": 1.0}).facts.ignored == []
+    assert ball.changed({"restitution": 1.0}).ignored == []
     answers = impact(ball, DTS[:1])
     assert named(answers, REBOUND, 3.0).measured == 0.0
     assert named(answers, LIVELY, 3.0).in_force == 0.5
@@ -143,7 +142,7 @@ def test_rolling_and_sliding_slow_down_by_friction_and_damping(tmp_path):
     assert of_roll.in_force < 0.92
     puck = body(tmp_path, link('<box size=".4 .4 .04"/>', extra='<contact><lateral_friction value="0.1"/></contact>'))
     along = slide(puck, DTS)[0]
-    assert puck.facts.friction == pytest.approx(0.1)
+    assert puck.friction == pytest.approx(0.1)
     assert along.limit == pytest.approx(along.in_force, rel=2e-3)
     assert along.physical / along.in_force > 1.015
 
@@ -157,14 +156,14 @@ def test_a_body_rests_on_its_lowest_point_and_a_hull_on_its_margin(tmp_path):
         [depth, _] = rest(hull, DTS[:1])
         assert depth.measured == pytest.approx(-1e-3, rel=0.03)
         assert depth.in_force == pytest.approx(-0.99e-3)
-    assert body(tmp_path, link('<capsule radius=".1" length=".3"/>')).facts.start()[1] == pytest.approx(0.25)
-    assert 'cylinder radius=".1"' in str(body(tmp_path, link('<cylinder radius=".1" length=".3"/>')).facts.ignored)
+    assert body(tmp_path, link('<capsule radius=".1" length=".3"/>')).start()[1] == pytest.approx(0.25)
+    assert 'cylinder radius=".1"' in str(body(tmp_path, link('<cylinder radius=".1" length=".3"/>')).ignored)
 
 
 def test_a_motion_does_not_depend_on_those_before_it(tmp_path):
     (tmp_path / "mesh.obj").write_text(TETRAHEDRON, encoding="utf-8")
     hull = body(tmp_path, link('<mesh filename="mesh.obj"/>'))  # hulls keep their contacts from step to step
-    starts = np.array([hull.facts.start(velocity=velocity) for velocity in (np.zeros(3), np.array([1.0, 0.0, 0.5]))])
+    starts = np.array([hull.start(velocity=velocity) for velocity in (np.zeros(3), np.array([1.0, 0.0, 0.5]))])
     both = hull.motions(starts, DTS[0], 200, -9.81 * UP, floor=True)
     np.testing.assert_array_equal(hull.motions(starts[::-1], DTS[0], 200, -9.81 * UP, floor=True)[::-1], both)
     server().clear()
@@ -179,7 +178,7 @@ def test_links_on_joints_are_cut_loose(tmp_path):
     before = robot.path.read_text(encoding="utf-8")
     assert robot.bodies([], True) == ["a", "b"]
     assert robot.bodies(["b"], False) == ["b"]
-    loose = robot.body("b", "plane.urdf").facts
+    loose = robot.body("b", "plane.urdf")
     assert loose.mass == 3.0
     assert [part.shape.shape for part in loose.parts] == ["mesh", "sphere"]
     assert robot.path.read_text(encoding="utf-8") == before
@@ -194,8 +193,8 @@ def test_links_on_joints_are_cut_loose(tmp_path):
 def test_what_pybullet_does_not_use_is_named(tmp_path):
     bare = '<link name="b"><collision><geometry><sphere radius=".1"/></geometry></collision></link>'
     odd = body(tmp_path, link(BOX, "1", extra='<lateral_friction value="0.9"/>'), bare, joint("floating"))
-    assert odd.facts.friction == 0.5
-    assert {name: made for name, _, made in odd.facts.ignored if name != "inertia"} == {
+    assert odd.friction == 0.5
+    assert {name: made for name, _, made in odd.ignored if name != "inertia"} == {
         "lateral_friction": "not read, because it is not within <contact>",
         "inertial of b": "missing: the mass is 1 kg",
         "joint": "replaced by a fixed joint",
@@ -205,9 +204,9 @@ def test_what_pybullet_does_not_use_is_named(tmp_path):
 def test_visual_geometry_bounds_the_inertia_and_does_not_collide(tmp_path):
     shell = '<visual><origin xyz="0 0 -.5" rpy="0 0 .3"/><geometry><cylinder radius="1" length="3"/></geometry></visual>'
     mug = body(tmp_path, link(BOX, extra=shell, at='<origin xyz="0 0 .02" rpy=".1 0 0"/>', moments=(0.3, 0.3, 0.1)))
-    assert [(part.shape.shape, part.collides) for part in mug.facts.parts] == [("box", True), ("mesh", False)]
-    assert not any(answer.findings for answer in inertia(mug.facts))
-    np.testing.assert_allclose(mug.facts.points[:, 2].min(), -2.0 - 0.02, rtol=1e-6)
+    assert [(part.shape.shape, part.collides) for part in mug.parts] == [("box", True), ("mesh", False)]
+    assert not any(answer.findings for answer in inertia(mug))
+    np.testing.assert_allclose(mug.points[:, 2].min(), -2.0 - 0.02, rtol=1e-6)
     assert 0.0 < rest(mug, DTS[:1])[0].measured < 3e-5
 
 
@@ -236,9 +235,9 @@ def test_a_file_that_is_wrong_is_refused_in_one_line(tmp_path, elements, message
 
 def test_the_server_holds_one_world(tmp_path):
     block = body(tmp_path, link(BOX))
-    block.motions(block.facts.start()[np.newaxis], DTS[0], 1, np.zeros(3), floor=False)
+    block.motions(block.start()[np.newaxis], DTS[0], 1, np.zeros(3), floor=False)
     assert server().getNumBodies() == 1
-    block.motions(block.facts.start()[np.newaxis], DTS[0], 1, np.zeros(3), floor=True)
+    block.motions(block.start()[np.newaxis], DTS[0], 1, np.zeros(3), floor=True)
     assert server().getNumBodies() == 2
     assert math.isclose(server().getPhysicsEngineParameters()["fixedTimeStep"], DTS[0])
 
@@ -246,7 +245,7 @@ def test_the_server_holds_one_world(tmp_path):
 def test_moments_of_a_sphere_are_named_with_the_factor_that_the_file_has(tmp_path):
     # 2/5 m r² = 0.1 kg m², times 3; as a solid sphere, 0.1 is the file's value too.
     ball = body(tmp_path, link(BALL, extra='<contact><inertia_scaling value="3.0"/></contact>'))
-    [(name, _, made)] = ball.facts.ignored
+    [(name, _, made)] = ball.ignored
     assert name == "inertia"
     assert made == "replaced by that of the sphere times <inertia_scaling>: 0.3, 0.3, 0.3 kg m²"
 
@@ -257,7 +256,7 @@ def test_moments_of_a_sphere_are_named_with_the_factor_that_the_file_has(tmp_pat
 def test_what_replaces_the_inertia_of_a_ball_is_named(tmp_path, on, made):
     """Of a ball that is turned, PyBullet takes the inertia of the box that bounds it."""
     ball = body(tmp_path, link(BALL, moments=(0.2, 0.2, 0.2), on=on))
-    [found] = [found for name, _, found in ball.facts.ignored if name == "inertia"]
+    [found] = [found for name, _, found in ball.ignored if name == "inertia"]
     assert found.startswith(f"replaced by that of {made}")
 
 
@@ -270,5 +269,5 @@ def test_a_ball_rolls_and_has_no_row_of_slides(tmp_path):
 
 def test_a_contact_with_stiffness_and_damping_has_no_exact_rebound(tmp_path):
     soft = "<contact><stiffness value='1000'/><damping value='10'/></contact>"
-    assert body(tmp_path, link(BALL, extra=soft)).facts.restitution is None
-    assert body(tmp_path, link(BALL)).facts.restitution == 0.0
+    assert body(tmp_path, link(BALL, extra=soft)).restitution is None
+    assert body(tmp_path, link(BALL)).restitution == 0.0

@@ -25,15 +25,15 @@ def test_settings_of_contacts_are_those_of_the_links_that_touch(tmp_path):
         return body(tmp_path, *parts, joint("fixed", origin=f'<origin xyz="{x} 0 {-0.5 * (not x)}"/>'))
 
     below, beside, alike = standing(0, 0.9, 0.0), standing(1, 0.9, 0.0), standing(1, 0.1, 0.9)
-    assert (below.facts.friction, below.facts.restitution, str(below.facts.settings["friction"])) == (
+    assert (below.friction, below.restitution, str(below.settings["friction"])) == (
         0.9,
         0.0,
         'value="0.9" (model.urdf, line 1)',
     )
     assert "restitution" not in below.remedies
-    assert math.isnan(beside.facts.friction)
-    assert beside.facts.restitution is None
-    assert alike.facts.friction == 0.1
+    assert math.isnan(beside.friction)
+    assert beside.restitution is None
+    assert alike.friction == 0.1
     [missed] = [answer.findings[0].detail for answer in Targets(friction=0.5).judged(beside, [])]
     assert missed == "the target is 0.5, but the geometries that touch the surface differ in it"
 

@@ -23,7 +23,7 @@ BALL = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 1"/><body
 class Stubborn:
     """A body whose error of 20 % no setting and no time step changes; it remembers the time steps."""
 
-    facts = SimpleNamespace(dt=0.01, unknown=(), settings={})
+    dt, unknown, settings = 0.01, (), {}
     remedies, causes = {"cone": {"cone": "elliptic"}}, {"slide": ("cone",)}
 
     def __init__(self):
@@ -55,7 +55,7 @@ def test_setting_of_a_replicate_is_named_without_a_line(tmp_path):
     body = '<body name="b" pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .1" margin=".01"/></body>'
     body = body_of(tmp_path, f'<replicate count="2" offset="1 0 0">{body}</replicate>', name="b0")
     [(answer, finding)] = findings_of(body, rest)
-    [sentence] = sentences(BodyDiagnosis("b0", "MuJoCo", answers=(replace(answer, findings=(finding,)),), settings=body.facts.settings))
+    [sentence] = sentences(BodyDiagnosis("b0", "MuJoCo", answers=(replace(answer, findings=(finding,)),), settings=body.settings))
     assert ": margin (compiled; its place in the file was not found). Remedy" in sentence
 
 
@@ -97,9 +97,9 @@ def test_a_large_error_is_not_tried_at_a_million_steps_per_second():
 
 @pytest.mark.parametrize(("value", "count"), [(0.02, 1), (math.inf, 0)])
 def test_decay_that_should_not_be_is_found_where_no_exact_solution_is_known(value, count):
-    facts = SimpleNamespace(unknown=("frictionloss",), falls=(0.0,), armature=0.0, lifted=0.0)
+    body = SimpleNamespace(unknown=("frictionloss",), falls=(0.0,), armature=0.0, lifted=0.0, causes={})
     blank = Answer("spin", DECAY_TIME, "s", physical=math.inf)
-    answer = judged(SimpleNamespace(facts=facts, causes={}), blank, [0.01], [value], [math.nan])
+    answer = judged(body, blank, [0.01], [value], [math.nan])
     assert len(answer.findings) == count
 
 

@@ -35,8 +35,6 @@ REMAINDER = 0.25
 """Of the difference between the two steps, what the extrapolation may leave: with 200 synthetic tosses of a box, 0.0002 of 0.0008. However
 many the tosses, their resamples do not show it.
 """
-Extrapolated = tuple[Profile, Array]
-"""The estimates of an engine at a time step of 0, and what may be left of the effect of the step, shape (2,)."""
 EQUAL = 0.02
 """Difference of a parameter between engines that may be neglected: in a restitution of 0.4, it changes a rebound's height by a tenth."""
 
@@ -155,13 +153,13 @@ def log_fit(
         ]
         if parameter == "friction" and len(bounded) > 1:
             friction = _of_all(parameter, bounded, size)
-    discrepancies = {label: profile.discrepancy for label, (profile, _) in fitted.items()}
+    discrepancies = {label: profile.discrepancy for label, profile in fitted.items()}
     return LogFit(size, frames, tuple(estimates), tuple(transfers), friction, discrepancies, left_out, _touches(flights, problems[0]))
 
 
 def _profile(
     problems: Sequence[Problem], entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]
-) -> Extrapolated | Breakdown:
+) -> Profile | Breakdown:
     """The estimates of an engine at a time step of 0."""
     found = []
     for problem in problems:
@@ -172,7 +170,7 @@ def _profile(
     return _without_step(*found)
 
 
-def _without_step(coarser: Profile, finer: Profile) -> Extrapolated:
+def _without_step(coarser: Profile, finer: Profile) -> Profile:
     """The estimates extrapolated to a time step of 0, resample by resample.
 
     How late an impact is differs from toss to toss, evenly between 0 and a step, so that what the extrapolation leaves of it has no mean,
@@ -185,8 +183,8 @@ def _without_step(coarser: Profile, finer: Profile) -> Extrapolated:
         return np.where((coarse == first) | (coarse == last), fine, np.clip(2.0 * fine - coarse, first, last))
 
     lower, upper = np.sort([extrapolated(coarser.lower, finer.lower), extrapolated(coarser.upper, finer.upper)], axis=0)
-    found = Profile(lower, upper, extrapolated(coarser.best, finer.best), finer.discrepancy)
-    return found, REMAINDER * (finer.value - coarser.value)
+    remainder = REMAINDER * (finer.value - coarser.value)
+    return Profile(lower, upper, extrapolated(coarser.best, finer.best), finer.discrepancy, remainder)
 
 
 def _touches(flights: Flights, problem: Problem) -> bool:
@@ -195,25 +193,25 @@ def _touches(flights: Flights, problem: Problem) -> bool:
     return bool(heights(header, poses[:, POSITION], poses[:, ORIENTATION]).min() < NEAR_FLOOR * header.body.size)
 
 
-def _estimate(label: str, parameter: str, found: Extrapolated, size: int) -> Estimate:
+def _estimate(label: str, parameter: str, profile: Profile, size: int) -> Estimate:
     """A parameter of an engine, from the tosses and their resamples; its interval contains what may be left of the effect of the step."""
-    tried, column, (profile, remainder) = FIRST_GRID[parameter], list(FIRST_GRID).index(parameter), found
+    tried, column = FIRST_GRID[parameter], list(FIRST_GRID).index(parameter)
     lower, upper = expanded(profile.lower[:, column], profile.upper[:, column], size)
     has_lower, has_upper = bool(lower > tried[0]), bool(upper < tried[-1])
-    left = abs(float(remainder[column])) if has_lower and has_upper else 0.0
+    left = abs(float(profile.remainder[column])) if has_lower and has_upper else 0.0
     lower, upper = max(lower - left, float(tried[0])), min(upper + left, float(tried[-1]))
     return Estimate(label, parameter, float(profile.value[column]), lower, upper, has_lower, has_upper)
 
 
-def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Extrapolated], size: int, *, are_bounded: bool) -> Transfer:
+def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Profile], size: int, *, are_bounded: bool) -> Transfer:
     """The difference of a parameter between two engines, resample by resample, at both ends of the values that are as good as the best.
 
     Estimates that are bounded on one side alone may be shown to differ, but not to be equal.
     """
-    column, (one, left), (other, other_left) = list(FIRST_GRID).index(parameter), fitted[first], fitted[second]
+    column, one, other = list(FIRST_GRID).index(parameter), fitted[first], fitted[second]
     ends = np.stack([one.lower - other.lower, one.upper - other.upper])[..., column]
     lower, upper = expanded(ends.min(axis=0), ends.max(axis=0), size)
-    by_step = abs(float((left - other_left)[column]))
+    by_step = abs(float((one.remainder - other.remainder)[column]))
     lower, upper = lower - by_step, upper + by_step
     differs = lower > 0.0 or upper < 0.0
     if not are_bounded and not differs:  # the ends may be those of the values that were tried
@@ -222,14 +220,14 @@ def _transfer(parameter: str, first: str, second: str, fitted: Mapping[str, Extr
     return Transfer(parameter, first, second, float(one.value[column] - other.value[column]), lower, upper, verdict)
 
 
-def _of_all(parameter: str, fitted: Mapping[str, Extrapolated], size: int) -> Estimate:
+def _of_all(parameter: str, fitted: Mapping[str, Profile], size: int) -> Estimate:
     """A parameter whichever engine continues the tosses, as the mean over engines that differ at random.
 
     The variance of the mean is that of resamples of the tosses and that of the engines; Student's t has the degrees of freedom of both.
     """
     column = list(FIRST_GRID).index(parameter)
-    values = np.array([profile.value[column] for profile, _ in fitted.values()])
-    resampled = np.mean([0.5 * (profile.lower + profile.upper)[:, column] for profile, _ in fitted.values()], axis=0)
+    values = np.array([profile.value[column] for profile in fitted.values()])
+    resampled = np.mean([0.5 * (profile.lower + profile.upper)[:, column] for profile in fitted.values()], axis=0)
     variances = np.array([resampled.var() * size / (size - 1), values.var(ddof=1) / len(values)])
     freedom = variances.sum() ** 2 / np.sum(variances**2 / [size - 1, len(values) - 1])
     half = float(stdtrit(freedom, 0.5 * (1.0 + LEVEL)) * np.sqrt(variances.sum()))

@@ -63,12 +63,14 @@ class Profile(NamedTuple):
         upper: The largest ones.
         best: The least and the largest from the tosses themselves, shape (2, 2).
         discrepancy: δ [m].
+        remainder: What may be left of the effect of the time step on the estimates, shape (2,).
     """
 
     lower: Array
     upper: Array
     best: Array
     discrepancy: float
+    remainder: Array = np.zeros(2)
 
     @property
     def value(self) -> Array:

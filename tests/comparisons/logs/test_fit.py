@@ -101,7 +101,7 @@ def test_friction_of_any_engine_has_the_interval_of_a_mean_over_engines():
 
 def profile(resampled, value):
     """The same at both time steps."""
-    return Profile(resampled, resampled, np.full((2, 2), value), 0.0), np.zeros(2)
+    return Profile(resampled, resampled, np.full((2, 2), value), 0.0)
 
 
 def bouncing_balls(seed, restitution, friction, count=12, rate=148.0, noise=2e-4):
@@ -163,8 +163,8 @@ def test_time_step_does_not_raise_the_restitution_of_a_ball():
 def test_estimates_at_two_time_steps_are_extrapolated_within_the_values_that_are_tried(coarser, finer, ends):
     """Twice the finer minus the coarser, in order, unless the coarser is at 0 or 1, where it is only a bound."""
     profiles = [Profile(np.full((9, 2), one[0]), np.full((9, 2), one[1]), np.tile(one, (2, 1)).T, 0.0) for one in (coarser, finer)]
-    found, remainder = log_fits._without_step(*profiles)
-    np.testing.assert_allclose(remainder, 0.25 * (np.mean(finer) - np.mean(coarser)), atol=1e-12)
+    found = log_fits._without_step(*profiles)
+    np.testing.assert_allclose(found.remainder, 0.25 * (np.mean(finer) - np.mean(coarser)), atol=1e-12)
     np.testing.assert_allclose([found.lower[0], found.upper[0]], np.tile(ends, (2, 1)).T, atol=1e-12)
     np.testing.assert_allclose(found.value, np.mean(ends), atol=1e-12)
 

@@ -6,6 +6,7 @@ is the plane y = 0.
 
 import math
 from collections.abc import Mapping
+from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -39,7 +40,6 @@ class MuJoCoAlone:
         file: The file.
         name: The body's name.
         on: The name of the geometry that it lands on; by default the plane or box of the world below it that it collides with.
-        changes: Settings that differ from those of the file.
 
     Attributes:
         head: The number of the body in the file's model.
@@ -54,8 +54,8 @@ class MuJoCoAlone:
         dof: The number of the first degree of freedom of the free joint; None without one.
     """
 
-    def __init__(self, file: MuJoCoFile, name: str, on: str | None, changes: Changes) -> None:
-        self.file, old, self._changes = file, file.model, changes
+    def __init__(self, file: MuJoCoFile, name: str, on: str | None) -> None:
+        self.file, old = file, file.model
         self.head = file.heads[name]
         self.group = file.group(self.head)
         self.geoms = [geom for geom in range(old.ngeom) if old.geom_bodyid[geom] in self.group]
@@ -74,12 +74,13 @@ class MuJoCoAlone:
         joint = old.body_jntadr[self.head]
         is_free = joint >= 0 and old.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
         self.dof = int(old.jnt_dofadr[joint]) if is_free else None
+        self._changes: Changes = {}
         self._models: dict[Any, Any] = {}
 
     def changed(self, changes: Changes) -> "MuJoCoAlone":
         """The same with other settings."""
-        new = object.__new__(MuJoCoAlone)
-        vars(new).update(vars(self), _changes=changes, _models={})
+        new = copy(self)
+        new._changes, new._models = changes, {}
         return new
 
     def model(self, dt: float, gravity: Array, *, floor: bool) -> Any:

@@ -74,7 +74,7 @@ class MuJoCoModel(MuJoCoFile):
 
     def body(self, name: str, on: str | None) -> LooseBody:
         """A body above what it lands on."""
-        return MuJoCoBody(name, MuJoCoAlone(self, name, on, {}))
+        return MuJoCoBody(name, MuJoCoAlone(self, name, on))
 
 
 class MuJoCoBody(LooseBody):

@@ -93,7 +93,8 @@ class PyBulletBody(LooseBody):
 
     def __init__(self, model: PyBulletModel, name: str, changes: Changes) -> None:
         self._model, self._changes = model, changes
-        self.name, self.engine, self.version, self.dt, self.gravity = name, "PyBullet", version("pybullet"), STEP, GRAVITY
+        self.name, self.engine, self.version = name, "PyBullet", version("pybullet")
+        self.dt, self.gravity = STEP, GRAVITY
         without = ("stiffness", "damping") if "stiffness" in changes else ()
         self._file = model.cut_loose(name, *without) if without or len(model.heads) > 1 else str(model.path)
         body, self._plane = self._world(True)

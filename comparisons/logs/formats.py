@@ -56,9 +56,9 @@ def read_columns(path: Path, given: str, topic: str | None) -> tuple[dict[str, A
         raise DropspinError(f"{given}: is not the data of a recording; give a file that ends in {', '.join(FORMATS)}.")
     raw = read_file(path, given, "recording", LARGEST_FILE)
     try:
-        columns = FORMATS[ending](raw, given, topic)
-    except DropspinError:
-        raise
+        columns = FORMATS[ending](raw, topic)
+    except DropspinError as error:
+        raise DropspinError(f"{given}: {error}") from None
     except Exception as error:  # whatever the libraries raise for a damaged file
         detail = printable(" ".join(str(error).split()) or type(error).__name__)
         raise DropspinError(f"{given}: is not {ending[1:].upper()}, or damaged: {detail:.200}.") from None
@@ -70,100 +70,100 @@ def read_columns(path: Path, given: str, topic: str | None) -> tuple[dict[str, A
     return {name: _numbers(given, name, values) for name, values in columns.items()}, names
 
 
-def _verify(given: str, names: Collection[str], rows: int = 0) -> None:
+def _verify(names: Collection[str], rows: int = 0) -> None:
     """Raise `DropspinError` for other columns than those of a recording, or too many rows."""
     known = (*NUMBERS, TOSS)
     for name in names:
         if name not in known:
-            raise DropspinError(f"{given}: column {shown(name)} is unknown.{did_you_mean(name, known)} Allowed: {', '.join(known)}.")
+            raise DropspinError(f"column {shown(name)} is unknown.{did_you_mean(name, known)} Allowed: {', '.join(known)}.")
     partly = {name for group in (VELOCITY, SPIN) if not set(group).isdisjoint(names) for name in group}
     if missing := [name for name in NUMBERS if name in REQUIRED | partly and name not in names]:
-        raise DropspinError(f"{given}: has no column {', '.join(missing)}; {'it has ' + ', '.join(names) if names else 'it has none'}.")
+        raise DropspinError(f"has no column {', '.join(missing)}; {'it has ' + ', '.join(names) if names else 'it has none'}.")
     if rows > MOST_ROWS:
-        raise DropspinError(f"{given}: has more than {MOST_ROWS:,} rows, the limit for a recording; give fewer tosses.")
+        raise DropspinError(f"has more than {MOST_ROWS:,} rows, the limit for a recording; give fewer tosses.")
 
 
-def _verify_first_line(given: str, names: Sequence[str]) -> None:
+def _verify_first_line(names: Sequence[str]) -> None:
     """Raise `DropspinError` for names of columns that show another separator, no name, or one name twice."""
     for sign, word in SEPARATORS.items():
         if len(names) == 1 and sign in names[0]:
             raise DropspinError(
-                f"{given}: column {shown(names[0])} is unknown: {word} separate the values; separate them by commas, and write decimals "
+                f"column {shown(names[0])} is unknown: {word} separate the values; separate them by commas, and write decimals "
                 "with a point."
             )
     for number, name in enumerate(names):
         if not name:
             where = "the first line ends in a separator; leave it out there and in all rows"
-            raise DropspinError(f"{given}: column {number + 1} has no name{': ' + where if not any(names[number:]) else '; name it'}.")
+            raise DropspinError(f"column {number + 1} has no name{': ' + where if not any(names[number:]) else '; name it'}.")
         if name in names[:number]:
-            raise DropspinError(f"{given}: column {shown(name)} is there twice; give each column once.")
+            raise DropspinError(f"column {shown(name)} is there twice; give each column once.")
 
 
-def _csv(raw: bytes, given: str, _topic: str | None) -> Columns:
+def _csv(raw: bytes, _topic: str | None) -> Columns:
     first = pd.read_csv(io.BytesIO(raw), nrows=1, header=None, skipinitialspace=True, dtype=str, keep_default_na=False)
     names = list(map(str, first.iloc[0]))
-    _verify_first_line(given, names)
-    _verify(given, names)
+    _verify_first_line(names)
+    _verify(names)
     options: dict[str, Any] = {"dtype": {TOSS: str}, "low_memory": False}
     with warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)  # it would leave out values
         try:
             table = pd.read_csv(io.BytesIO(raw), nrows=MOST_ROWS + 1, index_col=False, skipinitialspace=True, **options)
         except pd.errors.ParserWarning:
-            raise DropspinError(f"{given}: rows have more values than the first line has names; name every column.") from None
-    _verify(given, names, len(table))
+            raise DropspinError("rows have more values than the first line has names; name every column.") from None
+    _verify(names, len(table))
     return {name: table[name] for name in names}
 
 
-def _parquet(raw: bytes, given: str, _topic: str | None) -> Columns:
+def _parquet(raw: bytes, _topic: str | None) -> Columns:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     file = pq.ParquetFile(io.BytesIO(raw))
     names = [name for name in file.schema_arrow.names if not name.startswith("__index_level_")]  # pandas stores the index of a table so
-    _verify(given, names, file.metadata.num_rows)
+    _verify(names, file.metadata.num_rows)
     table = file.read(names)
     # Decimals, which are integers with a unit of 0.1^n, are as small as integers and stay what their writer rounded to.
     decimals = {name for name in table.column_names if pa.types.is_decimal(table.schema.field(name).type)}
     return {name: (table[name].cast(pa.float64()) if name in decimals else table[name]).to_pandas() for name in table.column_names}
 
 
-def _npz(raw: bytes, given: str, _topic: str | None) -> Columns:
+def _npz(raw: bytes, _topic: str | None) -> Columns:
     with zipfile.ZipFile(io.BytesIO(raw)) as archive:
-        _verify(given, [name.removesuffix(".npy") for name in archive.namelist()])
+        _verify([name.removesuffix(".npy") for name in archive.namelist()])
         for name in archive.namelist():
             with archive.open(name) as member:  # its head alone, which says how large it is
                 read_head = npy.read_array_header_1_0 if npy.read_magic(member) == (1, 0) else npy.read_array_header_2_0
                 shape, _, dtype = read_head(member)
             if len(shape) != 1 or dtype.kind not in "fiuU" or dtype.itemsize > 4 * LONGEST_NAME:
-                raise DropspinError(f"{given}: {name.removesuffix('.npy')} has shape {shape} and type {dtype}; give one number a row.")
-            _verify(given, list(NUMBERS), shape[0])
+                raise DropspinError(f"{name.removesuffix('.npy')} has shape {shape} and type {dtype}; give one number a row.")
+            _verify(list(NUMBERS), shape[0])
     with np.load(io.BytesIO(raw), allow_pickle=False) as arrays:
         return dict(arrays)
 
 
-def _mcap(raw: bytes, given: str, topic: str | None) -> Columns:
+def _mcap(raw: bytes, topic: str | None) -> Columns:
     try:
         from mcap.reader import make_reader
     except ImportError:
-        raise DropspinError(f"{given}: MCAP files need a package that is not installed: {install_extra('mcap')}.") from None
+        raise DropspinError(f"MCAP files need a package that is not installed: {install_extra('mcap')}.") from None
     rows: list[Any] = []
     topics: dict[str, None] = {}
     for _, channel, message in make_reader(io.BytesIO(raw)).iter_messages(topic, log_time_order=False):
         topics[channel.topic] = None
         rows.append(json.loads(message.data) if channel.message_encoding == "json" else None)
         if len(topics) > 1:
-            raise DropspinError(f"{given}: has several topics ({', '.join(topics)}); name one in the header, as topic.")
+            raise DropspinError(f"has several topics ({', '.join(topics)}); name one in the header, as topic.")
         if not isinstance(rows[-1], dict):
-            raise DropspinError(f"{given}: a message of topic {channel.topic} is not a JSON object of the columns.")
-        _verify(given, rows[0], len(rows))
+            raise DropspinError(f"a message of topic {channel.topic} is not a JSON object of the columns.")
+        _verify(rows[0], len(rows))
     if not rows:
-        raise DropspinError(f"{given}: has no message{'' if topic is None else f' of topic {topic}'}.")
+        raise DropspinError(f"has no message{'' if topic is None else f' of topic {topic}'}.")
     return dict(pd.DataFrame.from_records(rows, columns=list(rows[0])))
 
 
-FORMATS: dict[str, Callable[[bytes, str, str | None], Columns]] = {".csv": _csv, ".parquet": _parquet, ".npz": _npz, ".mcap": _mcap}
-"""By the ending of the file: the columns in its content; the path for messages, and the topic."""
+FORMATS: dict[str, Callable[[bytes, str | None], Columns]] = {".csv": _csv, ".parquet": _parquet, ".npz": _npz, ".mcap": _mcap}
+"""By the ending of the file: the function from its content and the topic to the columns."""
 
 
 def _numbers(given: str, name: str, values: Any) -> Array:

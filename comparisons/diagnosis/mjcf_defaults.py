@@ -2,16 +2,13 @@
 
 from dropspin.comparisons.diagnosis.source import Element, Setting
 
-NO_DEFAULTS = ("freejoint",)
-"""Elements of MJCF that no default class applies to."""
-
 
 def mjcf_setting(element: Element, attribute: str) -> Setting | None:
     """Where an attribute of an element of MJCF was set: there, or in a default class that applies to it; None if nowhere.
 
     MuJoCo merges several sections of defaults into one.
     """
-    if attribute in element.attributes or element.tag in NO_DEFAULTS:
+    if attribute in element.attributes or element.tag == "freejoint":  # to which no default class applies
         return element.setting(attribute)
     *places, root = element.around
     name = element.attributes.get("class", next((one.attributes["childclass"] for one in places if "childclass" in one.attributes), ""))

@@ -206,11 +206,6 @@ class MuJoCoAlone:
         settings = GeomSettings(friction=friction, **{name: plain(np.asarray(touching[name])) for name in names})
         return SoftContact(settings, option.cone == ELLIPTIC, option.impratio, option.timestep if self.file.is_safe else 0.0)
 
-    def above_plane(self, point: Array) -> Array:
-        """A point of the file's world [m] as seen from the plane that the body lands on, where it is level."""
-        assert self.surface is not None
-        return rotate(self.level, point - self.file.data.geom_xpos[self.surface])
-
     @property
     def gravity_angle(self) -> float:
         """The angle between gravity and the direction into the surface [°]."""

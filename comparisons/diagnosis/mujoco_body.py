@@ -192,9 +192,9 @@ class MuJoCoBody(LooseBody):
         """The geometries as shapes, relative to the centre of mass."""
         data, pairs = self._at_rest, self._alone.pairs
         for number, geom in enumerate(self._alone.geoms):
-            shape, shift, turned = shape_of(self._model, number)
+            shape, turned = shape_of(self._model, number)
             turn = quaternion(data.geom_xmat[number])
-            position = data.geom_xpos[number] - self.offset + rotate(turn, shift)
+            position = data.geom_xpos[number] - self.offset + rotate(turn, shape.centre)
             yield Part(self._alone.names[geom], shape, position, multiply(turn, turned), not pairs or geom in pairs)
 
     @property
@@ -224,7 +224,8 @@ class MuJoCoBody(LooseBody):
         parts = [part for part in self.parts if part.collides]
         if file.model.geom_type[alone.surface] != PLANE or not parts:
             return 0.0
-        centre = alone.above_plane(file.data.xpos[alone.head]) + rotate(self.pose, self.offset)
+        above = rotate(alone.level, file.data.xpos[alone.head] - file.data.geom_xpos[alone.surface])
+        centre = above + rotate(self.pose, self.offset)
         return -float(centre[1] + lowest_of(parts, self.pose))
 
     def _points(self) -> int:

@@ -22,15 +22,14 @@ def kind_of(model: Any, number: int) -> str:
     return mujoco.mjtGeom(int(model.geom_type[number])).name.removeprefix("mjGEOM_").lower().replace("hfield", "height field")
 
 
-def shape_of(model: Any, number: int) -> tuple[Shape, Array, Array]:
-    """A geometry as a solid of 1 kg, with its centre [m] and its orientation in the frame of the geometry."""
+def shape_of(model: Any, number: int) -> tuple[Shape, Array]:
+    """A geometry as a solid of 1 kg, with its orientation in the frame of the geometry."""
     size, name = model.geom_size[number].tolist(), kind_of(model, number)
     if name == "mesh":
-        shape = mesh_shape(*mesh_of(model, number))
-        return shape, shape.centre, STRAIGHT
+        return mesh_shape(*mesh_of(model, number)), STRAIGHT
     if name in ("capsule", "cylinder"):  # along y here
-        return solid(name, radius=size[0], half_length=size[1]), np.zeros(3), np.roll(UPWARD, -1)
-    return solid(name, **({"radius": size[0]} if name == "sphere" else {"half_extents": size})), np.zeros(3), STRAIGHT
+        return solid(name, radius=size[0], half_length=size[1]), np.roll(UPWARD, -1)
+    return solid(name, **({"radius": size[0]} if name == "sphere" else {"half_extents": size})), STRAIGHT
 
 
 def mesh_of(model: Any, geom: int) -> tuple[Array, Any]:

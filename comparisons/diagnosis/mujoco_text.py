@@ -100,7 +100,10 @@ class BodyText:
         places: dict[str, list[Element]] = {"gravcomp": self._bodies} | dict.fromkeys(OF_JOINT, self._joint)
         places |= dict.fromkeys(("contype", "conaffinity"), self._elements(self._in_contact))
         places["margin"] = self._elements(sorted(self._in_contact, key=lambda geom: -self.model.geom_margin[geom]))
-        places |= dict.fromkeys(("solref", "solimp", "friction", "condim"), self._elements(self._of_priority))
+        # Those of the largest priority alone count.
+        priorities = self.model.geom_priority[self._in_contact]
+        first = [geom for geom, priority in zip(self._in_contact, priorities, strict=True) if priority == priorities.max()]
+        places |= dict.fromkeys(("solref", "solimp", "friction", "condim"), self._elements(first))
         inertial = next(iter(children_of(body, "inertial")), None)
         written = {name: [mjcf_setting(one, name) for one in elements] for name, elements in places.items()}
         if inertial is not None:
@@ -122,12 +125,6 @@ class BodyText:
         """The geometries that touch, or all if none does, and the one that the body lands on."""
         touching = list(self._touching) or [geom for geom, body in enumerate(self.model.geom_bodyid) if body in self.group]
         return touching if self._surface is None else [*touching, self._surface]
-
-    @property
-    def _of_priority(self) -> list[int]:
-        """Those of the largest priority, whose settings of the contact count alone."""
-        priorities = self.model.geom_priority[self._in_contact]
-        return [geom for geom, priority in zip(self._in_contact, priorities, strict=True) if priority == priorities.max()]
 
     def _elements(self, geoms: Sequence[int]) -> list[Element]:
         """The elements that set a contact: the pairs, and those of geometries."""

@@ -21,9 +21,9 @@ FEWEST = 5
 """Tosses of which an interval is given: there are only 126 different resamples of five."""
 
 
-def resamples(size: int, seed: int = SEED) -> Array:
+def resamples(size: int) -> Array:
     """How often each of some tosses is in each resample, shape (RESAMPLES, size)."""
-    return np.random.default_rng(seed).multinomial(size, np.full(size, 1.0 / size), RESAMPLES).astype(float)
+    return np.random.default_rng(SEED).multinomial(size, np.full(size, 1.0 / size), RESAMPLES).astype(float)
 
 
 def expanded(lower: Array, upper: Array, size: int) -> tuple[float, float]:

@@ -26,6 +26,7 @@ def sweep_command(spec: str, output: str, json_output: bool, **options: Any) -> 
     from dropspin.comparisons.sweeps.running import run_sweep
     from dropspin.comparisons.sweeps.spec import load_sweep
     from dropspin.reports.stories import sweep as view
+    from dropspin.reports.stories.study import exit_code
     from dropspin.reports.terminal.progress import jobs_bar
     from dropspin.reports.terminal.rows import print_json_or
     from dropspin.scenarios.text import counted
@@ -40,4 +41,4 @@ def sweep_command(spec: str, output: str, json_output: bool, **options: Any) -> 
         raise KeyboardInterrupt(f"{count(output):,} of {asked.size:,} jobs are kept; --resume continues the sweep") from None
     written = f"{output}, {counted(asked.size, 'job')}; from Python: dropspin.read_sweep({output!r})"
     print_json_or(json_output, rows, view.document(rows), written)
-    return view.exit_code(rows)
+    return exit_code(verdict for row in rows for verdict in row["verdicts"])

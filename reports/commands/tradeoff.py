@@ -53,24 +53,25 @@ def tradeoff_command(scenes: tuple[str, ...], within: tuple[float, ...], output:
     """
     from dropspin.comparisons.engines.base import EngineBroken
     from dropspin.comparisons.tradeoff.study import NotCompared, tradeoff
-    from dropspin.reports.stories.tradeoff import TradeOffs, exit_code
+    from dropspin.reports.stories.study import exit_code
+    from dropspin.reports.stories.tradeoff import TradeOffs
     from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.scenarios import load
 
     loaded, results = list(map(load, scenes or ("spin-asymmetric",))), []
-    ladders: list[Any] = []
+    verdicts: list[str | None] = []
     named = bool(options["engines"])
     with written_study(output, json_output) as keep:
         for scene in loaded:
             try:
                 with share_bar(scene.name) as on_progress:
                     results.append(tradeoff(scene, **options, on_progress=on_progress))
-                ladders += results[-1].ladders
+                verdicts += [ladder.verdict for ladder in results[-1].ladders]
             except NotCompared as error:
-                ladders += error.ladders
+                verdicts += [ladder.verdict for ladder in error.ladders]
                 if scene is loaded[-1] and not results:
-                    raise EngineBroken(str(error)) if exit_code(ladders, named=named) else error from None
+                    raise EngineBroken(str(error)) if exit_code(verdicts, named=named) else error from None
                 click.echo(f"left out: {error}", err=True)
         keep(TradeOffs(scenes=results, within=within))
-    return exit_code(ladders, named=named)
+    return exit_code(verdicts, named=named)

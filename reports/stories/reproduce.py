@@ -7,11 +7,11 @@ from dataclasses import asdict
 from itertools import groupby
 from typing import Literal, get_args
 
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.published.results import Result, Status
 from dropspin.comparisons.published.sources import Source
 from dropspin.reports.document import Document, Heading, Paragraph, Part, Rows, Sentences, Table
 from dropspin.reports.stories.study import Records, Study
+from dropspin.reports.stories.study import exit_code as code_of
 from dropspin.scenarios.text import counted
 
 STATUSES: tuple[Status, ...] = get_args(Status)
@@ -93,5 +93,4 @@ def exit_code(results: Sequence[Result], *, named: bool) -> int:
     """1 if a value differs that is claimed to be reproducible, 3 if an engine broke down or a named source lacks it, otherwise 0."""
     if any(row.status == "differs" for row in results):
         return 1
-    without_value = BREAKDOWNS | {"missing"} if named else BREAKDOWNS
-    return 3 if any(row.verdict in without_value for row in results) else 0
+    return code_of((row.verdict for row in results), named=named)

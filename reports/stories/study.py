@@ -1,12 +1,13 @@
 """The base class of studies, as `section.json` stores them: the results with all digits, without sentences."""
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.reports.document import Document
 
 Records = list[dict[str, Any]]
@@ -31,6 +32,11 @@ class Study(BaseModel):
     @abstractmethod
     def document(self) -> Document:
         """The document that becomes the page, a section of a report, or the output on a terminal."""
+
+
+def exit_code(verdicts: Iterable[str | None], *, named: bool = False) -> int:
+    """3 if an engine broke down, or is missing although it was named; otherwise 0."""
+    return 3 if (BREAKDOWNS | ({"missing"} if named else set())).intersection(verdicts) else 0
 
 
 def with_all_columns(rows: Sequence[Mapping[str, Any]], left_out: Mapping[str, str] = MappingProxyType({})) -> Records:

@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.sweeps.folder import read_sweep_parts
 from dropspin.reports.document import Document, Table
 from dropspin.reports.stories.numbers import formatted, word
@@ -46,8 +45,3 @@ def document(table: Sequence[Mapping[str, Any]]) -> Document:
         for row in table
     ]
     return Document("Jobs", [Table(shown, left_out_first=[*reversed(columns)])])
-
-
-def exit_code(table: Sequence[Mapping[str, Any]]) -> int:
-    """The exit code: 0 if all jobs were run, 3 if an engine broke down in any job."""
-    return 3 if any(row["verdicts"].keys() & BREAKDOWNS for row in table) else 0

@@ -6,7 +6,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.tradeoff.errors import Ladder
 from dropspin.comparisons.tradeoff.points import LEVEL, CostPoint, TradeOff, spread
@@ -39,12 +38,6 @@ class TradeOffs(Study):
             parts += [Heading(study.scene.name), Charts(study.scene.name, tradeoff_charts(study))]
             parts += [Table(pareto_front_rows(study), left_out_first), Sentences(sentences(study, self.within), numbered=True)]
         return Document("What accuracy costs", parts)
-
-
-def exit_code(ladders: Sequence[Ladder], *, named: bool) -> int:
-    """3 if an engine broke down, or is missing although it was named; otherwise 0."""
-    without_result = BREAKDOWNS | {"missing"} if named else BREAKDOWNS
-    return 3 if any(ladder.verdict in without_result for ladder in ladders) else 0
 
 
 def _per_world(worlds: int) -> str:

@@ -5,9 +5,9 @@ import json
 import pytest
 from support.cli import dropspin
 
-from dropspin.comparisons.tradeoff.errors import BUDGET, Ladder
+from dropspin.comparisons.tradeoff.errors import BUDGET
 from dropspin.reports.commands.tradeoff import tradeoff_command
-from dropspin.reports.stories.tradeoff import exit_code
+from dropspin.reports.stories.study import exit_code
 from dropspin.reports.study_files import read_study
 
 pytestmark = pytest.mark.usefixtures("two_rounds")
@@ -146,5 +146,4 @@ def test_engine_that_breaks_down_or_is_missing_costs_its_rows_and_the_exit_code(
     [("missing", True, 3), ("missing", False, 0), ("declined", True, 0), ("crashed", False, 3), (None, True, 0)],
 )
 def test_exit_code_is_that_of_the_worst_engine(verdict, named, code):
-    ladders = [Ladder("wang", (), "budget", ""), Ladder("other", (), "not_run", "", "", verdict)]
-    assert exit_code(ladders, named=named) == code
+    assert exit_code([None, verdict], named=named) == code

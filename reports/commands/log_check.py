@@ -32,7 +32,7 @@ def log_check_command(recording: str, output: str, json_output: bool) -> int:
     with written_study(output, json_output, has_report=True) as keep:
         with share_bar(recording) as on_progress:
             check = log_check(recording, on_progress)
-        folder = keep(CheckedLog.of(recording, check))
+        folder = keep(CheckedLog(recording=recording, values=[*check.values], findings=[*check.findings], tosses=[*check.tosses]))
         write_toml(check.corrected.model_dump(mode="json", exclude_none=True), folder / "corrected.toml")
         can_continue = check.reads_the_columns_right and check.flights.log.header.floor is not None
         try:

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from dropspin.comparisons.logs.check import CENTRES, RATIOS, Check, TossFacts, Value
+from dropspin.comparisons.logs.check import CENTRES, RATIOS, TossFacts, Value
 from dropspin.comparisons.logs.log import Finding
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
@@ -37,11 +37,6 @@ class CheckedLog(Study):
     values: list[Value]
     findings: list[Finding]
     tosses: list[TossFacts]
-
-    @classmethod
-    def of(cls, recording: str, check: Check) -> "CheckedLog":
-        """The study of a check."""
-        return cls(recording=recording, values=list(check.values), findings=list(check.findings), tosses=list(check.tosses))
 
     def rows(self) -> Records:
         """A row for each value, finding and toss; every row has the columns of all three kinds."""

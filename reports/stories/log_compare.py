@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Literal
 
-from dropspin.comparisons.logs.compare import Error, LogComparison, Pair
+from dropspin.comparisons.logs.compare import Error, LogComparison, Pair, Share
 from dropspin.comparisons.logs.log import Finding
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Rows, Sentences, Table
 from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.colours import in_sentence
-from dropspin.reports.plots.intervals import Interval, interval_rows
+from dropspin.reports.plots.intervals import interval_rows
 from dropspin.reports.stories.log_findings import corrections
 from dropspin.reports.stories.numbers import formatted, grouped, left_out
 from dropspin.reports.stories.study import Records, Study, with_all_columns
@@ -74,41 +74,31 @@ def _error_chart(quantity: str, errors: Sequence[Error]) -> Chart:
     """The mean error of each engine over the motion."""
     scale, unit = OF[quantity]
     shown = [error for error in errors if (error.quantity, error.at) == (quantity, "mean")]
-    rows = [
-        Interval(error.engine, scale * error.value, scale * error.lower, scale * error.upper, scale * error.noise_floor) for error in shown
-    ]
+    rows = {error.engine: [scale * size for size in (error.value, error.lower, error.upper, error.noise_floor)] for error in shown}
     return interval_rows(f"error of {quantity}{unit}", rows, "noise floor")
 
 
 def _pair_chart(quantity: str, pairs: Sequence[Pair]) -> Chart:
     """The differences between engines."""
     scale, unit = OF[quantity]
-    shown = [pair for pair in pairs if pair.quantity == quantity]
-    rows = [Interval(_named(pair), scale * pair.difference, scale * pair.lower, scale * pair.upper, 0.0) for pair in shown]
+    shown = {f"{in_sentence(pair.first)} − {in_sentence(pair.second)}": pair for pair in pairs if pair.quantity == quantity}
+    rows = {names: [*(scale * size for size in (pair.difference, pair.lower, pair.upper)), 0.0] for names, pair in shown.items()}
     return interval_rows(f"difference of {quantity}{unit}", rows, "no difference")
-
-
-def _named(pair: Pair) -> str:
-    return f"{in_sentence(pair.first)} − {in_sentence(pair.second)}"
 
 
 def _error_rows(errors: Sequence[Error]) -> Rows:
     rows = []
     for (engine, quantity), kinds in grouped(errors, lambda error: (error.engine, error.quantity)).items():
-        unit = UNITS[kinds[0].unit][1]
-        cells = {error.at: _cell(error) for error in kinds}
+        scale, unit = UNITS[kinds[0].unit]
+        cells = {kind.at: f"{_interval(scale, kind.value, kind)} ({formatted(scale * kind.noise_floor)})" for kind in kinds}
         rows.append({"engine": engine, "error": quantity + unit} | {name: cells.get(at, "") for at, name in AT.items()})
     return rows
 
 
-def _cell(error: Error) -> str:
-    scale, _ = UNITS[error.unit]
-    return f"{interval(scale * error.value, scale * error.lower, scale * error.upper)} ({formatted(scale * error.noise_floor)})"
-
-
-def interval(value: float, lower: float, upper: float) -> str:
-    """A value with its interval; the value alone if it has no interval."""
-    return formatted(value) if math.isnan(lower) else f"{formatted(value)}, {formatted(lower)} to {formatted(upper)}"
+def _interval(scale: float, value: float, of: Error | Pair | Share) -> str:
+    """A value in the unit that is shown, with its interval; the value alone if it has no interval."""
+    ends = "" if math.isnan(of.lower) else f", {formatted(scale * of.lower)} to {formatted(scale * of.upper)}"
+    return formatted(scale * value) + ends
 
 
 def _pair_row(pair: Pair) -> dict[str, str]:
@@ -116,18 +106,15 @@ def _pair_row(pair: Pair) -> dict[str, str]:
     return {
         "engines": f"{pair.first} − {pair.second}",
         "error": pair.quantity + unit,
-        "difference": interval(scale * pair.difference, scale * pair.lower, scale * pair.upper),
+        "difference": _interval(scale, pair.difference, pair),
         "differ": "yes" if pair.differs else "not significantly",
     }
 
 
 def _group_sentences(study: LogComparison) -> list[str]:
     """A sentence on the groups for each quantity, and the meaning of the groups."""
-    sentences = [
-        f"In {quantity}, these engines do not differ significantly: {'; '.join(' and '.join(group) for group in groups if len(group) > 1)}."
-        for quantity, groups in study.groups.items()
-        if any(len(group) > 1 for group in groups)
-    ]
+    alike = {quantity: [" and ".join(group) for group in groups if len(group) > 1] for quantity, groups in study.groups.items()}
+    sentences = [f"In {name}, these engines do not differ significantly: {'; '.join(groups)}." for name, groups in alike.items() if groups]
     meaning = (
         "The 95 % intervals of the differences hold for all pairs simultaneously. Engines of one group are not ranked. An engine is in two "
         "groups if it does not differ significantly from any engine of either group."
@@ -139,6 +126,6 @@ def _part_rows(study: LogComparison) -> Rows:
     rows = []
     for (engine, quantity), parts in grouped(study.parts, lambda part: (part.engine, part.quantity)).items():
         scale, unit = OF[quantity]
-        cells = {part.part: interval(scale * part.value, scale * part.lower, scale * part.upper) for part in parts}
+        cells = {part.part: _interval(scale, part.value, part) for part in parts}
         rows.append({"engine": engine, "error": quantity + unit, **cells})
     return rows

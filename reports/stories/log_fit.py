@@ -8,7 +8,7 @@ from typing import Literal
 from dropspin.comparisons.logs.fit import EQUAL, Estimate, LogFit, Transfer
 from dropspin.comparisons.logs.log import Finding
 from dropspin.reports.document import Charts, Document, Sentences, Table
-from dropspin.reports.plots.intervals import Interval, interval_rows
+from dropspin.reports.plots.intervals import interval_rows
 from dropspin.reports.stories.log_findings import corrections
 from dropspin.reports.stories.numbers import formatted, grouped, left_out
 from dropspin.reports.stories.study import Records, Study, with_all_columns
@@ -72,7 +72,7 @@ class FittedLog(Study):
             if not row.has_lower and not row.has_upper
         ]
         charts = [
-            interval_rows(parameter, [Interval(row.engine, row.value, row.lower, row.upper) for row in alike])
+            interval_rows(parameter, {row.engine: (row.value, row.lower, row.upper) for row in alike})
             for parameter, alike in grouped(fit.estimates, lambda estimate: estimate.parameter).items()
         ]
         sentences = [legend, *unknown, *map(transfer, fit.transfers), *left_out(fit.left_out)]

@@ -60,7 +60,7 @@ def record_command(sent: tuple[str, ...], output: str, jobs: int | None, resourc
     echo(f"Record: {output}")
     if not pre:
         return 0
-    note = prereleases({engine: in_order(folder, engine, names) for engine, names in asked.items()})
-    write_text(os.path.join(output, "prereleases.md"), markdown(note.document, level=2))
-    print_document(note.document)
-    return int(note.has_changes)
+    document, has_changes = prereleases({engine: in_order(folder, engine, names) for engine, names in asked.items()})
+    write_text(os.path.join(output, "prereleases.md"), markdown(document, level=2))
+    print_document(document)
+    return int(has_changes)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
-from typing import NamedTuple
 
 from dropspin.comparisons.record.findings import Release, changes
 from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences
@@ -10,22 +9,15 @@ from dropspin.reports.stories.record import change_sentences
 from dropspin.scenarios.text import counted
 
 
-class Note(NamedTuple):
-    """The note, and whether a result changed or a release has no results."""
-
-    document: Document
-    has_changes: bool
-
-
-def prereleases(measured: Mapping[str, Sequence[Release]]) -> Note:
-    """The changes between the releases that were measured of each engine, oldest first."""
+def prereleases(measured: Mapping[str, Sequence[Release]]) -> tuple[Document, bool]:
+    """The changes between the releases that were measured of each engine, oldest first; and whether there is a change, or no result."""
     compared = {engine: releases for engine, releases in measured.items() if len(releases) > 1}
     changed = {engine: sentences for engine, releases in compared.items() if (sentences := _sentences(engine, releases))}
     parts = [part for engine, sentences in changed.items() for part in _of_engine(engine, compared[engine], sentences)]
     alike = [f"{engine}: no result changed from {_names(compared[engine])}." for engine in compared if engine not in changed]
     missing = [f"Without a prerelease after the newest release: {', '.join(engine for engine in measured if engine not in compared)}."]
     title = f"Changes in {len(changed)} of {counted(len(compared), 'compared engine')}"
-    return Note(Document(title, [*parts, Sentences(alike + (missing if len(compared) < len(measured) else []))]), bool(changed))
+    return Document(title, [*parts, Sentences(alike + (missing if len(compared) < len(measured) else []))]), bool(changed)
 
 
 def _of_engine(engine: str, releases: Sequence[Release], sentences: Sequence[str]) -> list[Part]:

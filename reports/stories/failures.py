@@ -2,9 +2,9 @@
 
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from operator import attrgetter, itemgetter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from dropspin.comparisons.judging.convergence import STUDIES
 from dropspin.comparisons.judging.verdicts import FAILURES
@@ -109,9 +109,8 @@ def failure_parts(results: Results, failures: Sequence[Failure], baseline: str |
             parts.append(Sentences([*explained, *sentences[:most], *others], style="red", on_page=on_page, on_terminal=not on_page))
         scenes = list(dict.fromkeys(failure.scene for alike in by_cause.values() for failure in alike))
         of_baseline = baseline if any(failure.accepted for failure in of_engine) else None
-        symmetries = any(failure.of_symmetry for failure in of_engine)
-        command = reproduce_scenes(results, scenes, engine, baseline=of_baseline, symmetries=symmetries)
-        parts.append(Paragraph("Reproduce:", command))
+        checks = _checks(of_baseline, symmetries=any(failure.of_symmetry for failure in of_engine))
+        parts.append(Paragraph("Reproduce:", reproduce_scenes(results, scenes, engine, more=checks)))
     return parts
 
 
@@ -174,18 +173,17 @@ def what_fails(row: Row) -> str:
 def reproduce(results: Results, row: Row, baseline: str | None = None) -> str:
     """The command that measures a row again, or the Python call if the scene or the engine was given as an object."""
     dts = None if math.isnan(row["dt"]) or row["kind"] in STUDIES else [row["dt"]]
-    of_baseline = baseline if row["kind"] == "baseline" else None
-    return reproduce_scenes(results, [row["scene"]], row["engine"], dts, of_baseline, symmetries=kind_of(row["metric"]) is not None)
+    more = _checks(baseline if row["kind"] == "baseline" else None, symmetries=kind_of(row["metric"]) is not None)
+    return reproduce_scenes(results, [row["scene"]], row["engine"], dts, more)
+
+
+def _checks(baseline: str | None, *, symmetries: bool) -> list[str]:
+    """The options of a run that compares with a baseline, or tests symmetries."""
+    return ["--symmetries"] * symmetries + ([] if baseline is None else ["--baseline", baseline])
 
 
 def reproduce_scenes(
-    results: Results,
-    names: Sequence[str],
-    label: str,
-    dts: Sequence[float] | None = None,
-    baseline: str | None = None,
-    *,
-    symmetries: bool = False,
+    results: Results, names: Sequence[str], label: str, dts: Sequence[float] | None = None, more: Sequence[str] = ()
 ) -> str:
     """The command that runs scenes with one engine again, or the Python call if a scene or the engine was given as an object.
 
@@ -194,8 +192,7 @@ def reproduce_scenes(
         names: Names of the scenes.
         label: Label of the engine.
         dts: Time steps [s]; None for all time steps of the run.
-        baseline: The baseline file to compare with.
-        symmetries: Whether to test symmetries too.
+        more: More options of the command; a Python call has none.
     """
     asked = results.provenance["asked"]
     scenes, steps = [results.scenes[name] for name in names], sorted(asked["dts"] if dts is None else dts, reverse=True)
@@ -205,8 +202,7 @@ def reproduce_scenes(
         named_scenes = named[0] if len(named) == 1 else f"[{', '.join(named)}]"
         named_engine = f"<engine {label!r}>" if engine is None else repr(engine)
         return f"dropspin.run({named_scenes}, {named_engine}, dt={[float(dt) for dt in steps]}{', quick=True' * asked.get('quick', False)})"
-    more = ["--symmetries"] * symmetries + ([] if baseline is None else ["--baseline", baseline])
-    return _command([scene.origin for scene in scenes], [engine], steps, asked, more)
+    return _command(results, [scene.origin for scene in scenes], [engine], steps, more)
 
 
 def reproduce_drawn(results: Results) -> list[str]:
@@ -217,14 +213,13 @@ def reproduce_drawn(results: Results) -> list[str]:
     named = [results.scenes[name].origin for name in asked["scenes"][: -asked["draw"]]]
     scenes = [*named, "--draw", str(asked["draw"]), "--seed", str(asked["seed"])]
     engines = [results.provenance["names"][label] for label in results.engines]
-    command = _command(scenes, engines, sorted(asked["dts"], reverse=True), asked)
+    command = _command(results, scenes, engines, sorted(asked["dts"], reverse=True))
     return [f"{counted(asked['draw'], 'scene was', 'scenes were')} drawn with seed {asked['seed']}. Reproduce: {command}"]
 
 
-def _command(
-    scenes: Sequence[str], engines: Sequence[str], dts: Sequence[float], asked: Mapping[str, Any], more: Sequence[str] = ()
-) -> str:
+def _command(results: Results, scenes: Sequence[str], engines: Sequence[str], dts: Sequence[float], more: Sequence[str] = ()) -> str:
     """The command that runs scenes again at time steps [s], with `--quick` and `--time-limit` if the run had them."""
+    asked = results.provenance["asked"]
     words = [word for engine in engines for word in ("-e", engine)] + [word for dt in dts for word in ("--dt", repr(float(dt)))]
     words += ["--quick"] * asked.get("quick", False)
     limit = asked["time_limit"]

@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 from dropspin.comparisons.measuring.metrics import METRICS
@@ -51,18 +52,12 @@ class KnownBugs(Study):
 
 def _of_bug(bug: Bug, result: Verdict, outcomes: Sequence[Outcome], *, on_terminal: bool) -> list[Part]:
     """The parts of the page on one report."""
-    parts: list[Part] = [
-        Heading(f"{bug.name}: {bug.kind}", on_terminal=on_terminal),
-        Paragraph(f"{bug.symptom}. Reported in {bug.year}: {bug.reference}", on_terminal=on_terminal),
-    ]
+    parts: list[Part] = [Heading(f"{bug.name}: {bug.kind}"), Paragraph(f"{bug.symptom}. Reported in {bug.year}: {bug.reference}")]
     if bug.label:
-        parts += [
-            Paragraph(f"Closed form: {bug.closed_form}.", on_terminal=on_terminal),
-            Paragraph("Shown by:", bug.command, on_terminal=on_terminal),
-            Table([_row(bug, outcome) for outcome in outcomes], on_terminal=on_terminal),
-            Sentences(_said(bug, outcomes), on_terminal=on_terminal),
-        ]
-    return [*parts, Paragraph(f"Verdict: {words(bug, result)}.", style="bold", on_terminal=on_terminal)]
+        parts += [Paragraph(f"Closed form: {bug.closed_form}."), Paragraph("Shown by:", bug.command)]
+        parts += [Table([_row(bug, outcome) for outcome in outcomes]), Sentences(_said(bug, outcomes))]
+    parts.append(Paragraph(f"Verdict: {words(bug, result)}.", style="bold"))
+    return [replace(part, on_terminal=on_terminal) for part in parts]
 
 
 def _row(bug: Bug, outcome: Outcome) -> dict[str, str]:

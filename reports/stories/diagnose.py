@@ -47,9 +47,8 @@ class Diagnosed(Study):
 
     def document(self) -> Document:
         """The measured values of one body or a table of several bodies, the differences between engines, and the findings."""
-        bodies, parts = self.diagnosis.bodies, list[Part]()
+        bodies, parts = self.diagnosis.bodies, list[Part]([Paragraph(COLUMNS, on_terminal=False)])
         by_name, measured = grouped(bodies, lambda body: body.name), [body for body in bodies if not body.breakdown]
-        parts.append(Paragraph(COLUMNS, on_terminal=False))
         if len(by_name) > 1:
             parts.append(Table(list(map(_overview, bodies)), ["mass", "lands on"]))
         for of_name in by_name.values():
@@ -84,13 +83,9 @@ def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
         return [*broken]
     others = f" (--on can choose {listed(body.others)})" if body.others else ""
     frictions = " and ".join(f"{one:g}" for one in (body.friction, body.friction_across) if not math.isnan(one))
-    lands = (
-        f"; lands on {body.surface}{others}, friction {frictions or 'differs between geometries'}"
-        if body.surface
-        else "; lands on no surface"
-    )
+    surface = f"{body.surface}{others}, friction {frictions or 'differs between geometries'}" if body.surface else "no surface"
     described = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg"
-    head = f"{described}; {body.engine} {body.version}, time step {in_ms(body.dt)}{lands}."
+    head = f"{described}; {body.engine} {body.version}, time step {in_ms(body.dt)}; lands on {surface}."
     drawn = charts(body)
     return [
         *broken,
@@ -131,7 +126,7 @@ def _overview(body: BodyDiagnosis) -> dict[str, str]:
         "engine": body.engine,
         "mass": f"{body.mass:.3g} kg",
         "lands on": body.surface or "–",
-        "findings": ", ".join([body.breakdown] * bool(body.breakdown) + [findings] * bool(findings)) or "none",
+        "findings": ", ".join(filter(None, [body.breakdown, findings])) or "none",
     }
 
 

@@ -1,13 +1,12 @@
 """`dropspin replay`."""
 
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import click
 
 from dropspin.reports.commands.options import POSITIVE, scenes_argument
-from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo
 
 
@@ -54,13 +53,8 @@ def replay_command(
     for option, (clip, _) in films.items():
         if len(shown) > 1:
             raise click.UsageError(f"{option} shows one scene; name it: {', '.join(replay.scene.name for replay in shown)}.")
-        with share_bar(clip) as progress:
-
-            def on_progress(share: float, progress: Callable[[str, float], None] = progress) -> None:
-                stop_if_interrupted()
-                progress("", share)
-
-            write_clip(shown[0], clip, speed, on_progress)
+        with share_bar(clip) as on_progress:
+            write_clip(shown[0], clip, speed, partial(on_progress, ""))
         echo(f"Written: {clip}")
     if films:
         return

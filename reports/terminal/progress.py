@@ -3,67 +3,60 @@
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from typing import Any, NamedTuple
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
-from dropspin.comparisons.running.progress import OnProgress, Progress
+from dropspin.comparisons.running.progress import Progress
 from dropspin.reports.stories.numbers import in_ms
 from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo, safe, styled
 from dropspin.scenarios.text import counted
 
 
-class RunProgress(NamedTuple):
-    """The functions that show the progress of a run.
+class RunProgress:
+    """The progress of a run, as a bar of scenes on a terminal; elsewhere, a line when a scene is finished, with the elapsed time."""
 
-    Attributes:
-        on_progress: To be called as `run` calls it.
-        on_finished: To be called with the name of each scene that is finished and the number of those that are; scenes run in parallel.
-        show_line: Prints a line.
-    """
+    def __init__(self, bar: Bar, scenes: int, pieces: int) -> None:
+        self._bar, self._task, self._scenes = bar, bar.add_task("starting", total=float(scenes * pieces)), counted(scenes, "scene")
+        self._start, self._done, self._finished, self._has_timed = time.monotonic(), 0, 0, False
+        self._shares: dict[str, float] = {}  # of the pieces of work that are not finished, by scene
 
-    on_progress: OnProgress
-    on_finished: Callable[[str, int], None]
-    show_line: Callable[[str], None]
+    def show_line(self, text: str) -> None:
+        """Print a line."""
+        if self._bar.disable:
+            echo(text, err=True)
+        else:
+            self._bar.console.print(styled(text), soft_wrap=True)
+
+    def on_progress(self, progress: Progress) -> None:
+        """Show the progress that `run` reports."""
+        stop_if_interrupted()
+        if self._bar.disable:
+            if progress.timing and not self._has_timed:
+                self.show_line("timing the steps of each engine")
+            self._has_timed |= progress.timing
+            return
+        self._done += progress.finished
+        is_between = progress.added or progress.finished or not progress.total
+        self._shares[progress.scene] = 0.0 if is_between else progress.done / progress.total
+        description = safe(f"{self._finished} of {self._scenes} finished; {_described(progress)}")
+        self._bar.update(self._task, completed=self._done + sum(self._shares.values()), description=description)
+
+    def on_finished(self, scene: str, count: int) -> None:
+        """Show that a scene is finished, and how many are; scenes run in parallel."""
+        self._finished = count
+        if self._bar.disable:
+            self.show_line(f"finished {scene} ({count} of {self._scenes}, {_duration(time.monotonic() - self._start)} elapsed)")
 
 
 @contextmanager
 def progress_bar(scenes: int, pieces: int) -> Iterator[RunProgress]:
-    """A progress bar of scenes on a terminal; elsewhere, a line when a scene is finished, with the elapsed time."""
-    start, done, finished, has_timed = time.monotonic(), 0, 0, False
-    shares: dict[str, float] = {}  # of the pieces of work that are not finished, by scene
-
-    def show_line(text: str) -> None:
-        if bar.disable:
-            echo(text, err=True)
-        else:
-            bar.console.print(styled(text), soft_wrap=True)
-
-    def on_progress(progress: Progress) -> None:
-        nonlocal done, has_timed
-        stop_if_interrupted()
-        if bar.disable:
-            if progress.timing and not has_timed:
-                show_line("timing the steps of each engine")
-            has_timed = has_timed or progress.timing
-            return
-        done += progress.finished
-        shares[progress.scene] = 0.0 if progress.added or progress.finished or not progress.total else progress.done / progress.total
-        description = safe(f"{finished} of {counted(scenes, 'scene')} finished; {_described(progress)}")
-        bar.update(task, completed=done + sum(shares.values()), description=description)
-
-    def on_finished(scene: str, count: int) -> None:
-        nonlocal finished
-        finished = count
-        if bar.disable:
-            show_line(f"finished {scene} ({finished} of {counted(scenes, 'scene')}, {_duration(time.monotonic() - start)} elapsed)")
-
+    """The progress of a run of some scenes, each with some pieces of work."""
     with _bar(BarColumn(bar_width=20), TaskProgressColumn(), TimeRemainingColumn()) as bar:
-        task = bar.add_task("starting", total=float(scenes * pieces))
-        yield RunProgress(on_progress, on_finished, show_line)
+        yield RunProgress(bar, scenes, pieces)
 
 
 @contextmanager

@@ -8,9 +8,13 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from dropspin.comparisons.judging.verdicts import MARKS
+from dropspin.comparisons.measuring.predictions import spins_steadily
 from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.plots.colours import NAMES, human_label, in_sentence
 from dropspin.reports.stories import numbers
+from dropspin.reports.stories.scene import left_out, modelled
+from dropspin.scenarios import reference_for
+from dropspin.scenarios.problems import identifier
 
 LABELS = re.compile(rf"(?<![\w'=/.\[-])(?<!-e )(?<!rerun )(?:{'|'.join(sorted(NAMES, reverse=True))})(?![\w-]|[.:]\w)(?:\[[^\]]*\])?")
 """The labels of engines that have names."""
@@ -44,11 +48,12 @@ ENVIRONMENT = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
-ENVIRONMENT.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "outcome", "quantity", "duration")}
+ENVIRONMENT.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "outcome", "duration")}
 ENVIRONMENT.filters |= {"unbroken": _unbroken, "human": human_label, "minus": with_minus, "names": with_names}
 ENVIRONMENT.filters["formatted"] = lambda value: with_minus(numbers.formatted(value))
 ENVIRONMENT.filters |= {"chart_data": chart_data, "sha256": _base64_sha256}
-ENVIRONMENT.globals |= {"subject": numbers.subject, "marks": MARKS}
+ENVIRONMENT.globals |= {"marks": MARKS, "identifier": identifier, "reference_for": reference_for}
+ENVIRONMENT.globals |= {"modelled": modelled, "left_out": left_out, "spins_steadily": spins_steadily}
 
 
 def page(template: str, **content: Any) -> str:

@@ -19,7 +19,6 @@ from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.plots.colours import engine_styles, human_label
 from dropspin.reports.stories import numbers
 from dropspin.reports.stories import record as view
-from dropspin.reports.stories.scene import modelled
 from dropspin.scenarios import truth_for
 from dropspin.scenarios.problems import identifier
 
@@ -52,7 +51,7 @@ class Site:
         self.styles = engine_styles(list(self.engines))
         divisions = numbers.grouped(self.engines, lambda label: "calibrated" if calibrated_label(label) is None else "default")
         self.divisions = dict(sorted(divisions.items()))
-        self.identifier, self.view = identifier, view
+        self.view = view
 
     def write(self, folder: Path) -> None:
         """Write all pages and badges into an empty folder."""
@@ -67,7 +66,7 @@ class Site:
             badge = view.badge(engine, newest, self.labels[engine][0], self.dts[-1])
             (folder / "badges" / f"{engine}.json").write_text(json.dumps(badge) + "\n", encoding="utf-8")
         for name, scene in self.scenes.items():
-            known = {"modelled": modelled(scene), "truth": truth_for(scene), "definition": METRICS[leading(name)].definition}
+            known = {"truth": truth_for(scene), "definition": METRICS[leading(name)].definition}
             self._write(folder / f"scene-{name}.html", "record_scene.html", scene=scene, **known)
 
     def _write(self, file: Path, template: str, **content: Any) -> None:

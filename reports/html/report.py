@@ -1,14 +1,14 @@
 """The report: one HTML file that needs no network."""
 
 from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from typing import Any
 
 import pandas as pd
 
 from dropspin.comparisons.judging.convergence import STUDIES
-from dropspin.comparisons.judging.verdicts import MARKS, OUTCOMES
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, OUTCOMES
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.comparisons.measuring.predictions import spins_steadily
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.provenance import first_settings
@@ -30,9 +30,6 @@ from dropspin.reports.stories.error_budget import error_budgets
 from dropspin.reports.stories.impact_laws import NOTE
 from dropspin.reports.stories.matrix import CHOICE, explanations, legend_of_marks, step_times
 from dropspin.reports.stories.run import Overview
-from dropspin.reports.stories.scene import left_out, modelled
-from dropspin.scenarios import reference_for
-from dropspin.scenarios.problems import identifier
 
 
 def html_report(
@@ -47,16 +44,14 @@ def html_report(
         sections: Studies to include.
     """
     finest = results.table.groupby("scene")["dt"].min().dropna().unique()
-    failing = {failure.scene for failure in summary.failures}
-    by_scene = enumerate(results.by_scene.items())
-    scenes = [_scene(of_scene, number, charts.get(name, {}), name in failing) for number, (name, of_scene) in by_scene]
+    scenes = [_scene(of_scene, number, charts.get(name, {})) for number, (name, of_scene) in enumerate(results.by_scene.items())]
     return page(
         "report.html",
         **summary._asdict(),
         engines=results.engines,
         references=_references(results),
         provenance=results.provenance,
-        passed=summary.counts.failed == 0 and summary.counts.broken == 0,
+        passed=not results.table["verdict"].isin(FAILURES | BREAKDOWNS).any(),
         colours=engine_colours(results.engines),
         negligible=SMALLEST_STATED,
         steps=numbers.in_ms(float(finest[0])) if len(finest) == 1 else "",
@@ -94,9 +89,8 @@ def _references(results: Results) -> str:
     return " and ".join(["exact solutions"] * exact + ["recordings"] * recorded)
 
 
-def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]], has_failed: bool) -> dict[str, Any]:
+def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]]) -> dict[str, Any]:
     [(name, scene)] = results.scenes.items()
-    truth = reference_for(scene)
     frame, own, order = results.table, results.measurements, list(ENSEMBLE_METRICS)
     dts = sorted(frame["dt"].dropna().unique(), reverse=True)
     pairs = results.agreements[results.agreements["dt"] == min(dts)]
@@ -109,12 +103,7 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
     return {
         "id": f"scene-{number:02d}",
         "name": name,
-        "problem": identifier(scene),
-        "failed": has_failed,
         "scene": scene,
-        "modelled": modelled(scene),
-        "left_out": left_out(scene),
-        "truth": truth,
         "dts": dts,
         "metrics": list(own["metric"].unique()),
         "cells": {(row["metric"], row["engine"], row["dt"]): row for row in own.to_dict("records")},
@@ -129,7 +118,6 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
         "agreement": pairs[~pairs["metric"].isin(order)].to_dict("records"),
         "contacts": worst_contacts(results, name),
         "ensemble": ensemble.sort_values("metric", key=lambda metrics: metrics.map(order.index), kind="stable").to_dict("records"),
-        "wobbles": not spins_steadily(scene),
         "scales": [f"{scale(scene, unit):.3g} {unit}" for unit in dict.fromkeys(own["unit"]) if unit not in ("1", "rad")],
         "has_intervals": any(line.is_fill for line in convergence),
         "has_predictions": any(line.label == PREDICTED for line in convergence),
@@ -139,11 +127,8 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
 
 def _trends(studies: pd.DataFrame) -> dict[Any, dict[str, str]]:
     """For each metric and engine, the behaviour of the error as dt → 0, its cause, and the worse of the verdicts of its two checks."""
-    pairs: dict[Any, list[Any]] = {}
-    for row in studies.to_dict("records"):
-        pairs.setdefault((row["metric"], row["engine"]), []).append(row)
     trends: dict[Any, dict[str, str]] = {}
-    for pair, rows in pairs.items():
+    for pair, rows in numbers.grouped(studies.to_dict("records"), itemgetter("metric", "engine")).items():
         order, asymptotic = (next((row for row in rows if row["kind"] == kind), None) for kind in STUDIES)
         m = asymptotic["value"] if asymptotic else float("nan")
         p = numbers.observed_order(order["value"], order["lower"], order["upper"]) if order else ""
@@ -154,15 +139,13 @@ def _trends(studies: pd.DataFrame) -> dict[Any, dict[str, str]]:
 
 def _all_results(results: Results, scene_name: str, rows: pd.DataFrame) -> dict[str, Any]:
     """All results by metric, engine and time step, dt → 0 last: number of the engine, whether the result failed, indices of texts."""
-    metrics = {metric: number for number, metric in enumerate(dict.fromkeys(rows["metric"]))}
-    engines = {engine: number for number, engine in enumerate(results.engines)}
     texts: dict[str, int] = {}
     found = []
-    for row in rows.assign(place=rows["metric"].map(metrics)).sort_values(["place", "engine", "dt"]).to_dict("records"):
+    for row in rows.assign(place=pd.factorize(rows["metric"])[0]).sort_values(["place", "engine", "dt"]).to_dict("records"):
         name = numbers.subject(row["metric"], row["kind"]) + numbers.unit(row["unit"])
         shown = map(with_minus, (numbers.formatted(row["value"]), numbers.bound(row["lower"], row["upper"])))
         values = [human_label(row["engine"]), numbers.in_ms(row["dt"]), *shown]
         judged = [f"{MARKS[row['verdict']]} {numbers.outcome(row['verdict'])}", row["cause"], row["reason"]]
         listed = (texts.setdefault(text, len(texts)) for text in [name, *values, *judged])
-        found.append([engines[row["engine"]], int(row["verdict"] == "failed"), *listed])
+        found.append([results.engines.index(row["engine"]), int(row["verdict"] == "failed"), *listed])
     return {"scene": scene_name, "rows": found, "texts": list(texts)}

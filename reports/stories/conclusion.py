@@ -151,7 +151,7 @@ def _absent(answer: Answer) -> str:
 def _cost(results: Results) -> list[str]:
     """What a second of motion costs with each engine at the finest time step, the cheapest first; none if no engine was timed."""
     dt = results.table["dt"].min()
-    times = {engine: time / dt for engine, time in step_times(results).items() if not math.isnan(time)}
+    times = {engine: time / dt for engine, time in step_times(results).items()}
     costs = [f"{in_sentence(engine)} {duration(float(f'{times[engine]:.2g}'))}" for engine in sorted(times, key=times.__getitem__)]
     return [f"1 s of motion at dt = {in_ms(dt)} takes {', '.join(costs)}."] if costs else []
 

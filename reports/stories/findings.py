@@ -1,6 +1,5 @@
 """The findings of a run as counts and sentences, for terminal, HTML and Markdown."""
 
-import math
 import statistics
 from collections import Counter
 from collections.abc import Collection, Hashable, Iterator, Mapping
@@ -258,12 +257,11 @@ def _largest(results: Results, errors: "pd.DataFrame") -> str:
 
 def _cost(engine: str, times: Mapping[str, float], compilation: float | None) -> list[str]:
     """The time per step of an engine, its ratio to that of the fastest engine, and the time to compile a scene, if any."""
-    timed = {label: time for label, time in times.items() if not math.isnan(time)}
-    if engine not in timed:
+    if engine not in times:
         return []
-    absolute = f"{duration(float(f'{timed[engine]:.2g}'))} per step"
-    fastest = min(timed, key=timed.__getitem__)
-    ratio = float(f"{timed[engine] / timed[fastest]:.2g}")
+    absolute = f"{duration(float(f'{times[engine]:.2g}'))} per step"
+    fastest = min(times, key=times.__getitem__)
+    ratio = float(f"{times[engine] / times[fastest]:.2g}")
     relative = "" if engine == fastest or ratio == 1.0 else f", {ratio:g} times that of {in_sentence(fastest)}"
     compiling = "" if compilation is None else f", after compiling a scene for up to {duration(float(f'{compilation:.2g}'))}"
     return [f"{absolute}{relative}{compiling}"]

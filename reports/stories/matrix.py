@@ -168,14 +168,14 @@ def shown_scenes(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str
 def step_times(results: Results) -> dict[str, float]:
     """The time per step [s], by engine: the geometric mean over the scenes and time steps in which all engines were timed.
 
-    Ratios of these times are therefore the geometric means of the ratios. NaN for an engine that was not timed or broke down in every
-    scene, and for all if there are no scenes and time steps in which all others were timed and did not break down.
+    Ratios of these times are therefore the geometric means of the ratios. An engine that was not timed or broke down in every scene has no
+    time, and none has one if there are no scenes and time steps in which all others were timed and did not break down.
     """
     table = results.table[~results.table["verdict"].isin(BREAKDOWNS)]
     timed = table[table["time_per_step"] > 0.0].drop_duplicates(["scene", "engine", "dt"])
     times = timed.pivot(index=["scene", "dt"], columns="engine", values="time_per_step")
     means = np.exp(np.log(times.dropna()).mean())
-    return {engine: float(means.get(engine, math.nan)) for engine in results.engines}
+    return {engine: float(means[engine]) for engine in results.engines if means.get(engine, 0.0) > 0.0}
 
 
 def level(error: float) -> int | None:

@@ -12,7 +12,6 @@ from dropspin.reports.document import Document, Heading, Paragraph, Part, Senten
 from dropspin.reports.stories.conclusion import Point, conclusion, conditions
 from dropspin.reports.stories.failures import Failure, failure_parts, failures, reproduce_drawn
 from dropspin.reports.stories.findings import (
-    Counts,
     ProfileComparison,
     beside_recordings,
     counts,
@@ -36,7 +35,6 @@ class Overview(NamedTuple):
         points: What a quick run left out, engines that are missing or have default settings, which engine to use for which quantity,
             and the command that draws the same random scenes again.
         findings: The main finding on each engine.
-        counts: The number of checks with each verdict.
         statuses: The status of each engine in each scene, by scene and engine.
         leading: The leading error of each scene with an exact solution, by scene.
         profiles: Engines with default settings compared with the calibrated ones.
@@ -48,7 +46,6 @@ class Overview(NamedTuple):
     verdict: str
     points: Sequence[Point]
     findings: Sequence[str]
-    counts: Counts
     statuses: Mapping[str, Mapping[str, Status]]
     leading: Mapping[str, Leading]
     profiles: Sequence[ProfileComparison]
@@ -64,14 +61,13 @@ class Overview(NamedTuple):
 
 def overview(results: Results) -> Overview:
     """The overview of a run."""
-    tally, profiles = counts(results), profile_comparisons(results)
+    profiles = profile_comparisons(results)
     before = [*_quick(results), *missing_engines(results), *(profile.sentence for profile in profiles)]
     after = [*ensemble_differences(results), *beside_recordings(results), *reproduce_drawn(results)]
     return Overview(
-        verdict=verdict_sentence(results, tally),
+        verdict=verdict_sentence(results, counts(results)),
         points=[*map(Point, before), *conclusion(results), *map(Point, after)],
         findings=finding_sentences(results),
-        counts=tally,
         statuses=results.statuses(),
         leading=leading_errors(results),
         profiles=profiles,

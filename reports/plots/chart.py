@@ -34,7 +34,7 @@ FLAT = 1e-9
 """Values that vary by less than this share of the largest value are drawn as constant, so that the axis does not show rounding errors."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Line:
     """A line of a chart.
 
@@ -168,8 +168,7 @@ def _draw_lines(chart: Chart, axes: "Axes") -> None:
         labelled.add(line.label)
         style: dict[str, Any] = {"solid_capstyle": "butt"} if chart.rows else {}
         if line.is_sparse:
-            number = next(number for number, other in enumerate(sparse) if other is line)
-            style["markevery"] = ((number + 0.5) / len(sparse) * BETWEEN_MARKERS, BETWEEN_MARKERS)
+            style["markevery"] = ((sparse.index(line) + 0.5) / len(sparse) * BETWEEN_MARKERS, BETWEEN_MARKERS)
         _draw_line(line, label, np.maximum(line.y, ROUNDING) if chart.y_log else line.y, style, axes)
 
 

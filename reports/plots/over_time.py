@@ -114,8 +114,5 @@ def _drawn(line: Line, times: Array) -> Line:
     constant = reach <= FLAT * float(np.abs(line.y[finite]).max(initial=0.0))
     if constant or not finite.any() or missed.mean() <= MOST_MISSED:
         return replace(line, x=x, y=y)
-    parts = np.split(line.y, shown[1:])
-    low, high = (
-        np.array([reduce(part) for part in parts]) for reduce in (np.fmin.reduce, np.fmax.reduce)
-    )  # without NaN, as far as there is a number
+    low, high = (extreme.reduceat(line.y, shown) for extreme in (np.fmin, np.fmax))  # without NaN, as far as there is a number
     return replace(line, x=x, y=0.5 * (low + high), marker="", is_sparse=False, low=low, high=high, is_fill=True)

@@ -6,7 +6,7 @@ from contextlib import chdir, contextmanager
 from importlib import import_module
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -37,17 +37,10 @@ COMMON: Any = {
 }
 
 
-class Size(NamedTuple):
-    """The size of a figure: the width of a panel and its height [inches], how many are in a row, and the size of the font [points]."""
-
-    width: float
-    height: float
-    across: int
-    font: float
-
-
-SIZES = {"column": Size(3.4, 2.3, 1, 8.0), "page": Size(3.5, 2.4, 2, 9.0), "report": Size(3.7, 2.9, 3, 9.0)}
-"""Sizes of figures, by name: as wide as a column of a journal (86 mm), as a page (178 mm), and three panels in a row."""
+SIZES = {"column": (3.4, 2.3, 1, 8.0), "page": (3.5, 2.4, 2, 9.0), "report": (3.7, 2.9, 3, 9.0)}
+"""Sizes of figures, by name: as wide as a column of a journal (86 mm), as a page (178 mm), and three panels in a row. A size has the width
+and the height of a panel [inches], the number of panels in a row, and the size of the font [points].
+"""
 LOOKS: dict[str, list[Any]] = {
     "light": [{"grid.color": "black"}],
     "dark": ["dark_background"],

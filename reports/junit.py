@@ -44,11 +44,10 @@ def _case(results: Results, row: Row, baseline: str | None) -> TestCase:
     of = _printable(f"{row['engine']}.{row['scene']}")
     case = TestCase(f"{accepted}{what}{at}", classname=of, time=0.0 if math.isnan(took) else round(took, 6))
     said = _printable(what_fails(row))
-    details = _printable(f"{said}\nReproduce: {reproduce(results, row, baseline)}")
     verdict = row["verdict"]
     if verdict in FAILURES or row["broke_down"]:
         result = (Failure if verdict in FAILURES else Error)(said, verdict)
-        result.text = details
+        result.text = _printable(f"{said}\nReproduce: {reproduce(results, row, baseline)}")
         case.result = [result]
     elif verdict != "passed":
         case.result = [Skipped(f"{outcome(verdict)}: {_printable(row['reason'])}")]

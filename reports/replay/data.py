@@ -106,8 +106,7 @@ def _orientations(rotations: Array) -> Array:
 
 def _halved(numbers: Array) -> str:
     """The upper halves of 32-bit floats, rounded: a relative error of 0.2 % for values of which two digits are shown."""
-    largest = 1e38
-    bits = np.minimum(numbers, largest).astype("<f4").view("<u4") + np.uint32(2**15)
+    bits = np.minimum(numbers, 1e38).astype("<f4").view("<u4") + np.uint32(2**15)
     return _base64((bits >> np.uint32(16)).astype("<u2"))
 
 

@@ -32,10 +32,8 @@ def formatted(value: float) -> str:
 
 def bound(lower: float, upper: float) -> str:
     """Bounds as an inequality; empty if there are none."""
-    if math.isnan(lower) and math.isnan(upper):
-        return ""
     if math.isnan(lower):
-        return f"≤ {upper:.3g}"
+        return "" if math.isnan(upper) else f"≤ {upper:.3g}"
     if math.isnan(upper):
         return f"≥ {lower:.3g}"
     return f"± {upper:.3g}" if lower == -upper else f"{lower:.3g} … {upper:.3g}"

@@ -20,7 +20,7 @@ from dropspin.reports.html.strip import strip_of
 from dropspin.reports.pages import page, with_minus
 from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.chart_data import chart_data
-from dropspin.reports.plots.colours import engine_colours, human_label
+from dropspin.reports.plots.colours import engine_styles, human_label
 from dropspin.reports.plots.convergence import PREDICTED
 from dropspin.reports.plots.run_charts import CHARTS
 from dropspin.reports.replay import as_data, replay_of
@@ -52,7 +52,7 @@ def html_report(
         references=_references(results),
         provenance=results.provenance,
         passed=not results.table["verdict"].isin(FAILURES | BREAKDOWNS).any(),
-        colours=engine_colours(results.engines),
+        styles=engine_styles(results.engines),
         negligible=SMALLEST_STATED,
         steps=numbers.in_ms(float(finest[0])) if len(finest) == 1 else "",
         times=step_times(results),

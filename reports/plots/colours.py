@@ -55,11 +55,6 @@ def engine_styles(engines: Sequence[str]) -> dict[str, EngineStyle]:
     return {engine: styles[engine] for engine in engines}
 
 
-def engine_colours(engines: Sequence[str]) -> dict[str, str]:
-    """The colour of each engine, from `engine_styles`."""
-    return {engine: style.colour for engine, style in engine_styles(engines).items()}
-
-
 def human_label(label: str) -> str:
     """The name of an engine with its options as plots show it: `MuJoCo, RK4` for `mujoco[integrator=rk4]`; any other text unchanged.
 

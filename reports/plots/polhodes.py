@@ -97,18 +97,14 @@ def principal_spin(scene: Scenario, motion: Trajectory) -> Array:
 
 def energy_ellipsoid(scene: Scenario) -> Array:
     """Half axes √(2 T / I) of the ellipsoid of angular velocities that have the initial rotational energy T [rad/s], shape (3,)."""
-    moments, _ = _principal(scene)
-    return np.sqrt(moments @ _start(scene) ** 2 / moments)
+    (moments, _), start = _principal(scene), Trajectory.from_states(np.zeros(1), scene.initial_state[None])
+    return np.sqrt(moments @ principal_spin(scene, start)[0] ** 2 / moments)
 
 
 def _principal(scene: Scenario) -> tuple[Array, Array]:
     """Principal moments of inertia, smallest first [kg m²], and their axes in the body frame, as columns of a right-handed triad."""
     moments, axes = np.linalg.eigh(scene.body.inertia_tensor)
     return moments, axes * np.linalg.det(axes)
-
-
-def _start(scene: Scenario) -> Array:
-    return principal_spin(scene, Trajectory.from_states(np.zeros(1), scene.initial_state[None]))[0]
 
 
 def _in_sight(path: Array, half_axes: Array) -> Array:

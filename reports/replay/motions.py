@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring.comparison import Comparison, exactly
 from dropspin.comparisons.results.results import Results
-from dropspin.reports.plots.colours import engine_colours
+from dropspin.reports.plots.colours import engine_styles
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, reference_for
 from dropspin.scenarios.mechanics import angular_momentum
 from dropspin.scenarios.rotations import angle_between_orientations, conjugate, cross, dot, multiply
@@ -141,8 +141,8 @@ def replay_of(results: Results, scene_name: str, dt: float | None = None) -> Rep
 
 def replay_together(scene: Scenario, dt: float, moved: Mapping[str, Trajectory]) -> Replay:
     """Motions of a scene at a time step [s], by their labels, and the exact solution or the recording if there is one."""
-    every, truth, colours = _stride(scene.steps(dt)), reference_for(scene), engine_colours(tuple(moved))
-    motions = [_motion(scene, truth, label, colours[label], motion, every) for label, motion in moved.items()]
+    every, truth, styles = _stride(scene.steps(dt)), reference_for(scene), engine_styles(tuple(moved))
+    motions = [_motion(scene, truth, label, styles[label].colour, motion, every) for label, motion in moved.items()]
     if truth is not None:
         motions.append(_exact_motion(scene, truth, dt * every * np.arange(scene.steps(dt) // every + 1, dtype=np.float64)))
     return Replay(scene, dt, dt * every, [motion for motion in motions if len(motion.frames) > 1])

@@ -10,7 +10,7 @@ from PIL import Image
 from support.cli import dropspin
 
 import dropspin as ds
-from dropspin.reports.plots.colours import engine_colours, human_label
+from dropspin.reports.plots.colours import engine_styles, human_label
 from dropspin.scenarios.rotations import angle_between_orientations, rotate
 
 ENGINES = ["wang", "mujoco", "pybullet"]
@@ -131,7 +131,7 @@ def hues(colours):
 def test_chosen_body_is_filled_and_no_other(replay):
     """By pointer and by keyboard: most coloured pixels have the hue of its engine."""
     shown = replay("spin-asymmetric")
-    colours = [[int(colour[i : i + 2], 16) for i in (1, 3, 5)] for colour in engine_colours(ENGINES).values()]
+    colours = [[int(style.colour[i : i + 2], 16) for i in (1, 3, 5)] for style in engine_styles(ENGINES).values()]
     radios = [shown.home.get_by_role("radio", name=human_label(engine)) for engine in ENGINES]
     for number, choose in enumerate([radios[0].check, lambda: radios[0].press("ArrowDown"), radios[2].check]):
         choose()

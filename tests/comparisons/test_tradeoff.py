@@ -255,10 +255,10 @@ def test_batch_without_a_cost_has_the_reason(batch, are_timed, verdict, reason):
     engine = type("Batched", (Exact,), {"name": "batched", "prepare_batch": prepare_batch})()
     times, failure = costs.costs_per_world(EngineEntry("batched", engine), SPIN, [1e-2, 2e-2], 4)
     assert np.isfinite(times).tolist() == are_timed
-    ladder = study._with_failure(Ladder("batched", (), "budget", ""), failure)
+    ladder = study._with_failures(Ladder("batched", (), "budget", ""), True, failure)
     assert (ladder.verdict, ladder.no_batch_cost) == (verdict, reason)
     _, without = costs.costs_per_world(EngineEntry("exact", Exact()), SPIN, [1e-2], 4)
-    assert study._with_failure(ladder, without) == ladder
+    assert study._with_failures(ladder, True, without) == ladder
 
 
 @pytest.fixture(scope="module")

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
-from threading import Event, Lock
+from threading import Lock
 from typing import TypeVar
 
 from dropspin.comparisons.results.interrupts import finished, interrupts_deferred
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.process_limits import ResourceLimits
-from dropspin.comparisons.running.processes import Closed, EngineProcesses
+from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import DropspinError
 
@@ -61,7 +61,7 @@ def as_done(
 
 def work_in_parallel(
     pieces: Iterator[Piece],
-    work: Callable[[Piece, EngineProcesses, Callable[[], None]], Result],
+    work: Callable[[Piece, EngineProcesses], Result],
     crews: Sequence[EngineProcesses],
     on_done: Callable[[Piece, Result], None],
     on_wait: Callable[[], None] = ignore,
@@ -70,21 +70,16 @@ def work_in_parallel(
 
     Args:
         pieces: The pieces; the next one is requested when a processor is free.
-        work: Called in a thread, with a piece, engine processes that no other piece uses at that time, and a function that raises once all
-            work is to stop.
+        work: Called in a thread, with a piece, and engine processes that no other piece uses at that time.
         crews: Engine processes for each of the pieces that are done at a time; they are abandoned if the work stops before its end.
         on_done: Called with each piece and its result, in the order in which they are done; may raise to stop.
         on_wait: Called at least twice a second; may raise to stop.
     """
-    stopping, idle = Event(), list(crews)
-
-    def raise_if_stopping() -> None:
-        if stopping.is_set():
-            raise Closed
+    idle = list(crews)
 
     def work_with_processes(piece: Piece) -> Result:
         processes = idle.pop()
-        found = work(piece, processes, raise_if_stopping)
+        found = work(piece, processes)
         idle.append(processes)
         return found
 
@@ -97,7 +92,6 @@ def work_in_parallel(
                     on_done(*done)
         except BaseException:
             # The engine processes end first, then the threads that wait for them; such an end is no failure of an engine.
-            stopping.set()
             for processes in crews:
                 processes.abandon()
             raise
@@ -143,7 +137,7 @@ def results_in_parallel(
     found: dict[int, Result] = {}
     lock = Lock()
 
-    def do(number: int, processes: EngineProcesses, _: Callable[[], None]) -> Result:
+    def do(number: int, processes: EngineProcesses) -> Result:
         def report(what: str) -> None:
             with lock:
                 on_progress(what, len(found) / len(pieces))

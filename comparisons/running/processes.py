@@ -117,6 +117,8 @@ class EngineProcesses:
                 return Breakdown("timed_out", f"not done after {WALL_TIME_FACTOR * allowed:g} s of wall time")
             largest = max(largest, self._memory(entry.label))
             on_simulations(*self._shared[entry.label][1:])
+        if self._closed:  # a process that ended with the work has not failed
+            raise Closed
         try:
             result: Result | Breakdown = task.result()
         except ProcessExpired as end:

@@ -96,7 +96,7 @@ def run(
         if on_forecast is not None:
             on_forecast(expected)
 
-        def of_scene(own: StartPhase, processes: EngineProcesses, _: Callable[[], None]) -> Results:
+        def of_scene(own: StartPhase, processes: EngineProcesses) -> Results:
             return run_scene(own, entries, dts, processes, report, stamp, timings)
 
         def on_done(own: StartPhase, part: Results) -> None:

@@ -72,8 +72,8 @@ def run_sweep(
     if scheduler is None:
         folder.begin(work.description)
 
-        def run_part(part: range, processes: EngineProcesses, raise_if_stopping: Callable[[], None]) -> None:
-            folder.write(part, work.table(part, processes, raise_if_stopping))
+        def run_part(part: range, processes: EngineProcesses) -> None:
+            folder.write(part, work.table(part, processes))
 
         with started_crews(None, usable_cores(), [], work.resources) as crews:
             work_in_parallel(missing, run_part, crews, lambda part, _: report(len(part)), lambda: report(0))

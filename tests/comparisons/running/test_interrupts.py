@@ -27,7 +27,7 @@ def taken_and_interrupted(futures):
 
 _base._AcquireFutures.__enter__ = taken_and_interrupted
 
-def work(piece, processes, raise_if_stopping):
+def work(piece, processes):
     time.sleep(0.2)
     return piece
 

@@ -22,7 +22,7 @@ from support.cli import dropspin
 import dropspin as ds
 from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.process_limits import ResourceLimits
-from dropspin.comparisons.running.processes import EngineProcesses
+from dropspin.comparisons.running.processes import Closed, EngineProcesses
 
 BALL, SPIN, TIGHT = breaking.BALL, breaking.SPIN, breaking.TIGHT
 TESTS = Path(__file__).parents[2]
@@ -103,6 +103,11 @@ def test_worker_that_may_start_no_process_is_named(monkeypatch):
 def _work_for_two_seconds(entry):
     time.sleep(2.0)
     return "done"
+
+
+def test_process_that_ends_with_abandoned_work_is_no_failure():
+    with EngineProcesses(ResourceLimits()) as processes, pytest.raises(Closed):
+        processes.call(engine_entry("wang"), _work_for_two_seconds, on_simulations=lambda *_: processes.abandon())
 
 
 def test_wall_clock_that_is_set_times_no_engine_out(monkeypatch):

@@ -5,6 +5,7 @@ import numpy as np
 from dropspin.scenarios import Scenario, Trajectory, Truth
 from dropspin.scenarios.mechanics import kinetic_energy
 from dropspin.scenarios.state import RATES, SPIN, Array
+from dropspin.scenarios.truths.truth import Impact
 
 
 def has_reference(scene: Scenario, truth: Truth | None) -> bool:
@@ -30,7 +31,12 @@ def has_impact(scene: Scenario, truth: Truth | None) -> bool:
 
     The body starts above the floor.
     """
-    return truth is not None and len(truth.events) > 0 and truth.events[0].wall is None and scene.starts_above_floor
+    return _first_impact_with_floor(truth) is not None and scene.starts_above_floor
+
+
+def _first_impact_with_floor(truth: Truth | None) -> Impact | None:
+    """The first event of an exact solution, unless it is with a wall."""
+    return truth.events[0] if truth is not None and truth.events and truth.events[0].wall is None else None
 
 
 def has_newton_restitution(scene: Scenario, truth: Truth | None) -> bool:
@@ -40,13 +46,8 @@ def has_newton_restitution(scene: Scenario, truth: Truth | None) -> bool:
 
 def lands(scene: Scenario, truth: Truth | None) -> bool:
     """An exact solution that turns on the floor before its first impact."""
-    return (
-        truth is not None
-        and not starts_in_flight(scene)
-        and len(truth.events) > 0
-        and truth.events[0].wall is None
-        and bool(truth.events[0].time > 0.0 and truth.events[0].before[SPIN].any())
-    )
+    first = _first_impact_with_floor(truth)
+    return first is not None and not starts_in_flight(scene) and first.time > 0.0 and bool(first.before[SPIN].any())
 
 
 def comes_to_rest(scene: Scenario, truth: Truth | None) -> bool:

@@ -192,11 +192,11 @@ def find_limits(
 def _axes(scene: Scenario, names: Sequence[str]) -> list[Axis]:
     """The axes with these names, or all axes that a scene has."""
     verify_known("axis", names, AXES)
+    has = [name for name, axis in AXES.items() if axis.applies(scene)]
     for name in names:
-        if not AXES[name].applies(scene):
-            has = ", ".join(axis.name for axis in AXES.values() if axis.applies(scene))
-            raise DropspinError(f"axis {name!r}: {scene.name} does not have it; it has {has}.")
-    return [AXES[name] for name in names] if names else [axis for axis in AXES.values() if axis.applies(scene)]
+        if name not in has:
+            raise DropspinError(f"axis {name!r}: {scene.name} does not have it; it has {', '.join(has)}.")
+    return [AXES[name] for name in names or has]
 
 
 def refine(runner: Runner) -> tuple[ScanPoint, ...]:

@@ -122,11 +122,9 @@ def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Eff
 def _recent_maximum(values: Array) -> Array:
     """The largest value of the last half, at least, and of the last three quarters, at most, of the steps so far, shape (n,)."""
     maxima = values.copy()
-    start = 1
-    while start < len(values):
+    for start in (2**power for power in range((len(values) - 1).bit_length())):
         since = start // 2
         maxima[start : 2 * start] = np.maximum.accumulate(values[since : 2 * start])[start - since :]
-        start *= 2
     return maxima
 
 

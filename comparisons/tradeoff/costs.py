@@ -136,6 +136,5 @@ def memory_per_world(entry: EngineEntry, scene: Scenario, dt: float, worlds: int
 
 def _process_memory(key: str) -> int:
     """A number of this process's status: its present memory, `VmRSS`, or the peak of that, `VmHWM` [bytes]."""
-    match = re.search(rf"^{key}:\s+(\d+) kB$", (PROCESS / "status").read_text(), re.MULTILINE)
-    assert match is not None
-    return 1024 * int(match[1])
+    [size] = re.findall(rf"^{key}:\s+(\d+) kB$", (PROCESS / "status").read_text(), re.MULTILINE)
+    return 1024 * int(size)

@@ -24,17 +24,10 @@ def engine_entry(engine: Engine | str, resources: ResourceLimits = ONE_MINUTE) -
     Raises:
         DropspinError: There is no engine of that name, or it is neither an engine nor a name.
     """
-    if isinstance(engine, Engine):
-        verify_name(getattr(engine, "name", ""), type(engine), f"engine: {type(engine).__qualname__}")
-        return EngineEntry(engine.label, engine)
-    if not isinstance(engine, str):
-        raise DropspinError(f"engine: got {described_value(engine)}; give a name such as 'mujoco', or an Engine.")
-    name = engine.strip()
     try:
-        found = _stand_in(name, resources) if is_foreign(parsed(name)[0]) else engine_named(name)
+        return present_entry(engine, resources)
     except (EngineMissing, EngineBroken) as error:
-        return EngineEntry(name, None, "missing" if isinstance(error, EngineMissing) else "broken", str(error))
-    return EngineEntry(found.label, found)
+        return EngineEntry(str(engine).strip(), None, "missing" if isinstance(error, EngineMissing) else "broken", str(error))
 
 
 def engine_entries(
@@ -57,7 +50,7 @@ def engine_entries(
     return entries
 
 
-def present_entry(engine: Engine | str) -> EngineEntry:
+def present_entry(engine: Engine | str, resources: ResourceLimits = ONE_MINUTE) -> EngineEntry:
     """An engine by its name, or an engine object, that can run.
 
     Raises:
@@ -65,10 +58,14 @@ def present_entry(engine: Engine | str) -> EngineEntry:
         EngineBroken: It cannot be imported or constructed.
         DropspinError: There is no engine of that name, or it is neither an engine nor a name.
     """
-    entry = engine_entry(engine)
-    if entry.engine is None:
-        raise (EngineMissing if entry.absence == "missing" else EngineBroken)(entry.reason)
-    return entry
+    if isinstance(engine, Engine):
+        verify_name(getattr(engine, "name", ""), type(engine), f"engine: {type(engine).__qualname__}")
+        return EngineEntry(engine.label, engine)
+    if not isinstance(engine, str):
+        raise DropspinError(f"engine: got {described_value(engine)}; give a name such as 'mujoco', or an Engine.")
+    name = engine.strip()
+    found = _stand_in(name, resources) if is_foreign(parsed(name)[0]) else engine_named(name)
+    return EngineEntry(found.label, found)
 
 
 def _stand_in(name: str, resources: ResourceLimits) -> Engine:

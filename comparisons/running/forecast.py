@@ -11,7 +11,7 @@ from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.perturbed_starts import number_of_simulations
 from dropspin.comparisons.running.start_phases import StartPhase, number_of_phases
-from dropspin.comparisons.running.timing import Timing
+from dropspin.comparisons.running.timing import Timings
 from dropspin.comparisons.running.uncertainty import simulations_of
 
 MEASURING = 1e-5
@@ -36,13 +36,7 @@ class Forecast(NamedTuple):
     quick: float
 
 
-def forecast(
-    scenes: Sequence[StartPhase],
-    entries: Sequence[EngineEntry],
-    dts: Sequence[float],
-    timings: Mapping[tuple[str, str, float], Timing],
-    jobs: int,
-) -> Forecast:
+def forecast(scenes: Sequence[StartPhase], entries: Sequence[EngineEntry], dts: Sequence[float], timings: Timings, jobs: int) -> Forecast:
     """The forecast of a run.
 
     Time steps that are added to extrapolate an error, tests of symmetries and the report are not included. A batch counts as one

@@ -116,11 +116,7 @@ def run(
 
 
 def _request(
-    scenes: SceneLike | Iterable[SceneLike],
-    engines: Engine | str | Iterable[Engine | str],
-    dt: float | Iterable[float],
-    resources: ResourceLimits,
-    quick: bool,
+    scenes: SceneLike | Iterable[SceneLike], asked: list[Engine | str], dt: float | Iterable[float], resources: ResourceLimits, quick: bool
 ) -> tuple[list[StartPhase], list[EngineEntry], list[float], dict[str, Any]]:
     """The scenes with their exact solutions, the engines, the time steps [s] and the provenance of a request.
 
@@ -128,8 +124,7 @@ def _request(
         DropspinError: The request cannot be run.
     """
     chosen = as_scenes(scenes)
-    asked, dts = several("engines", engines), several("dt", dt)
-    entries = engine_entries(asked, resources=resources)
+    entries, dts = engine_entries(asked, resources=resources), several("dt", dt)
     for name, given in (("scenes", chosen), ("engines", entries), ("dt", dts)):
         if not given:
             raise DropspinError(f"{name}: got none; give at least one.")

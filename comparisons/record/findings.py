@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.packages import numbers_of
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
@@ -24,6 +23,7 @@ from dropspin.comparisons.record.plan import load_plan
 from dropspin.comparisons.record.store import MACHINE, OTHERS, OWN, Record, Row, machine, stored
 from dropspin.scenarios import DropspinError, load
 from dropspin.scenarios.loading import names
+from dropspin.scenarios.state import Array
 
 MOST_DIGITS = 15.0
 """Digits of an error of 0: double precision has no more."""
@@ -248,7 +248,7 @@ def periods(label: str, releases: Sequence[Release], changed: Iterable[Change]) 
     return found
 
 
-def profile(errors: Mapping[str, Sequence[float]]) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def profile(errors: Mapping[str, Sequence[float]]) -> dict[str, tuple[Array, Array]]:
     """Performance profiles: for each engine, the share of scenes in which its error is at most τ times the smallest of all engines.
 
     Dolan & Moré (2002), "Benchmarking optimization software with performance profiles", Math. Program. 91, eq. (2.1) and (2.2), with the

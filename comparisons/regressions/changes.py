@@ -17,6 +17,7 @@ from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.table import OF_SYMMETRIES, are_among
 from dropspin.scenarios import DropspinError, Trajectory
+from dropspin.scenarios.state import Array
 
 KEY = ["scene", "engine", "steps", "metric", "kind"]
 """The columns that identify a result; `steps` is the time step as text, or, for orders and asymptotic errors, all time steps used."""
@@ -267,7 +268,7 @@ def speed_changes(old: Results, new: Results) -> list[SpeedChange]:
     return list(smallest.values())
 
 
-def _interval_of_median(ratios: NDArray[np.float64]) -> tuple[float, float]:
+def _interval_of_median(ratios: Array) -> tuple[float, float]:
     """The exact confidence interval of the median of positive numbers, which is unbounded with fewer than six."""
     from scipy import stats
 

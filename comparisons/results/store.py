@@ -13,7 +13,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from dropspin.comparisons.results import older_formats
 from dropspin.comparisons.results.complete_folders import file_name, read_stored, sha256
@@ -24,6 +23,7 @@ from dropspin.comparisons.results.table import results_table
 from dropspin.scenarios import DropspinError, Scenario, SceneError, Trajectory
 from dropspin.scenarios.loading import from_mapping
 from dropspin.scenarios.rotations import length
+from dropspin.scenarios.state import Array
 
 FEWEST_ROWS = 2
 """Of a trajectory: metrics take the time step from them."""
@@ -178,7 +178,7 @@ def _save_arrays(
     return files
 
 
-def _loaded_arrays(content: bytes, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, NDArray[np.float64]]:
+def _loaded_arrays(content: bytes, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Array]:
     """The arrays in a .npz file, by name.
 
     Raises:

@@ -10,7 +10,6 @@ from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Engine, numpy_array
 from dropspin.comparisons.running.driving import Breakdown, classify, verify_accepted
@@ -18,6 +17,7 @@ from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress
 from dropspin.scenarios import Scenario
+from dropspin.scenarios.state import Array
 
 TIMING_REPEATS = 3
 """The least of so many timings counts: other load on the machine can only add to a time."""
@@ -42,7 +42,7 @@ class TimedSteps(NamedTuple):
     call: float
     stepping: float
     steps: int
-    state: NDArray[np.float64]
+    state: Array
 
     @property
     def whole(self) -> float:

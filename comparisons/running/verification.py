@@ -6,14 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Engine, KnownLimitation, Simulation, numpy_array
 from dropspin.comparisons.engines.exceptions import LONGEST, described, short
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.model import initial_states
 from dropspin.scenarios.rotations import length
-from dropspin.scenarios.state import ORIENTATION, PARTS, SPIN, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, PARTS, SPIN, VELOCITY, Array
 from dropspin.scenarios.validation import shown
 
 MULTIPLE = 8
@@ -68,12 +67,12 @@ def verified_lag(lag: Any, dt: float) -> float:
     return float(lag)
 
 
-def verify_start(engine: Engine, scene: Scenario, state: NDArray[np.float64]) -> None:
+def verify_start(engine: Engine, scene: Scenario, state: Array) -> None:
     """Raise `BuildMismatch` unless a state equals the scene's start to 8 eps, a spin to 64; q and -q are the same orientation."""
     verify_starts(engine, [scene], state[np.newaxis], MULTIPLE)
 
 
-def verify_starts(engine: Engine, scenes: Sequence[Scenario], states: NDArray[np.float64], multiple: int = BATCH_MULTIPLE) -> None:
+def verify_starts(engine: Engine, scenes: Sequence[Scenario], states: Array, multiple: int = BATCH_MULTIPLE) -> None:
     """As `verify_start`, for each scene and its state, states of shape (size, 13)."""
     starts = initial_states(scenes)
     opposite = np.einsum("ij,ij->i", states[:, ORIENTATION], starts[:, ORIENTATION]) < 0.0
@@ -85,7 +84,7 @@ def verify_starts(engine: Engine, scenes: Sequence[Scenario], states: NDArray[np
         _verify_equal(engine, f"{name.replace('_', ' ')} at the start", states[:, part], starts[:, part], allowed, least)
 
 
-def verified_record(states: Any, rows: int) -> NDArray[np.float64]:
+def verified_record(states: Any, rows: int) -> Array:
     """A copy of an engine's record as float64: the number of rows asked for, unit quaternions; numbers that are not finite are let through.
 
     Raises:
@@ -110,7 +109,7 @@ def verified_record(states: Any, rows: int) -> NDArray[np.float64]:
     return record
 
 
-def verified_batch(states: Any, size: int, rows: int) -> NDArray[np.float64]:
+def verified_batch(states: Any, size: int, rows: int) -> Array:
     """A copy of an engine's record of a batch as float64, shape (size, rows, 13), each of its motions as in `verified_record`.
 
     Raises:
@@ -217,14 +216,7 @@ def _verified_number(what: str, number: Any) -> float:
     return float(number)
 
 
-def _verify_equal(
-    engine: Engine,
-    what: str,
-    found: NDArray[np.float64],
-    expected: NDArray[np.float64],
-    multiple: int = MULTIPLE,
-    least: NDArray[np.float64] | float = 0.0,
-) -> None:
+def _verify_equal(engine: Engine, what: str, found: Array, expected: Array, multiple: int = MULTIPLE, least: Array | float = 0.0) -> None:
     """Raise `BuildMismatch` unless each row of an array equals that of another to some eps of its largest number, or of a `least` one."""
     largest, difference = np.maximum(np.abs(expected).max(axis=1), least), np.abs(found - expected).max(axis=1)
     allowed = multiple * float(np.finfo(engine.precision).eps) * largest

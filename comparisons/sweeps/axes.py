@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.scenarios.ensemble import uniform
+from dropspin.scenarios.state import Array
 
 Indices = NDArray[np.int64]
 Spacing = Literal["linear", "log"]
@@ -63,7 +64,7 @@ class Spaced:
         values[indices == self.count - 1] = self.last  # without rounding
         return values
 
-    def _between(self, fractions: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _between(self, fractions: Array) -> Array:
         """The values at fractions of the distance from the first to the last, or of the distance between their logarithms."""
         if self.spacing == "linear":
             return self.first + (self.last - self.first) * fractions

@@ -17,6 +17,7 @@ from dropspin.comparisons.sweeps.axes import Drawn, Indices, SweepAxis
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.ensemble import spread_start
 from dropspin.scenarios.fields import content_of, path_of, set_field, with_fields
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.validation import shown
 
 OPTION = "engine."
@@ -40,7 +41,7 @@ class Jobs:
     scene: Scenario
     engine: Engine
     numbers: Indices
-    dts: NDArray[np.float64]
+    dts: Array
     seeds: Indices | None
     values: dict[str, NDArray[Any]]
 

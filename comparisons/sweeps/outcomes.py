@@ -5,7 +5,6 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.comparison import Comparison
@@ -16,7 +15,7 @@ from dropspin.comparisons.running.inputs import verify_time_step
 from dropspin.comparisons.running.verification import verified_refusal
 from dropspin.comparisons.sweeps.jobs import Jobs, scene_of
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
-from dropspin.scenarios.state import STATE_COLUMNS
+from dropspin.scenarios.state import STATE_COLUMNS, Array
 
 STANDARD_METRICS = ("energy_drift", "energy_gain", "penetration", "rebound", "rest_time")
 """Measured in every sweep; none needs a reference solution."""
@@ -54,7 +53,7 @@ def set_breakdown(outcome: np.record, breakdown: Breakdown) -> None:
     outcome.verdict, outcome.reason = breakdown.verdict, " ".join(breakdown.reason.split())
 
 
-def standard_metrics(motions: Motions) -> NDArray[np.float64]:
+def standard_metrics(motions: Motions) -> Array:
     """The `STANDARD_METRICS` of motions, shape (..., 5); NaN where one does not apply.
 
     Energy drift and gain do not apply with damping, nor where there is no energy at all, and drift only to a start in flight; penetration

@@ -12,13 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from dropspin.comparisons.conformance.impacts import (
-    OF_NOTE,
-    OF_REBOUND,
-    PECULIARITIES,
-    explain_impact,
-    verify_no_decay,
-)
+from dropspin.comparisons.conformance.impacts import OF_NOTE, OF_REBOUND, PECULIARITIES, explain_impact, verify_no_decay
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
 from dropspin.comparisons.conformance.probes import DT, PROBES, Probe, differences
 from dropspin.comparisons.conformance.symptoms import symptoms

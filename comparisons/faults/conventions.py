@@ -5,14 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from dropspin.comparisons.faults.fault_model import (
-    Change,
-    FaultModel,
-    Reported,
-    Simulated,
-    changed_part,
-    changed_start,
-)
+from dropspin.comparisons.faults.fault_model import Change, FaultModel, Reported, Simulated, changed_part, changed_start
 from dropspin.scenarios.rotations import about as rotation_about
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, RATES, SPIN, VELOCITY, Array

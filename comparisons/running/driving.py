@@ -119,12 +119,7 @@ def record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_
 
 
 def record_batch(
-    engine: Engine,
-    members: Sequence[Scenario],
-    dt: float,
-    on_simulations: OnSimulations = ignore,
-    *,
-    limitations: bool = False,
+    engine: Engine, members: Sequence[Scenario], dt: float, on_simulations: OnSimulations = ignore, *, limitations: bool = False
 ) -> list[Recording]:
     """Drive an engine through scenes of the same number of steps: together if it can, else one after another.
 

@@ -46,12 +46,7 @@ class EngineRun:
 
 
 def run_engine(
-    entry: EngineEntry,
-    scene: Scenario,
-    dt: float,
-    starts: Sequence[Scenario],
-    quick: bool,
-    on_simulations: OnSimulations = share_progress,
+    entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario], quick: bool, on_simulations: OnSimulations = share_progress
 ) -> EngineRun:
     """Run a scene from its own start, then from each of its start phases if there are several; failures are part of the result.
 

@@ -75,11 +75,7 @@ class EngineProcesses:
                 pass
 
     def call(
-        self,
-        entry: EngineEntry,
-        work: Callable[[EngineEntry, *Given], Result],
-        *given: *Given,
-        on_simulations: OnSimulations = ignore,
+        self, entry: EngineEntry, work: Callable[[EngineEntry, *Given], Result], *given: *Given, on_simulations: OnSimulations = ignore
     ) -> Result | Breakdown:
         """The result of a function that is called in an engine's process with the entry, or why there is none.
 

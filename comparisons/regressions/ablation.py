@@ -61,5 +61,5 @@ def _rows(changed: "pd.Series[Any]", results: Results, baseline: Baseline, impor
     with EngineProcesses(ResourceLimits()) as processes:
         error_of = EngineStudy(StartPhase(scene, truth_for(scene)), entry, processes, ignore).error_of(metric, dt)
         change = changed["value"] - changed["before"]
-        for names, share in explaining(entry.adapter, back, error_of, back, change).items():
+        for names, share in explaining(entry.adapter, back, error_of, change).items():
             yield Case(scene.name, label, dt).measurement("setting", metric.name, "1", Judgement(share, "measured"), names)

@@ -6,11 +6,10 @@ threshold below which there is none: then pairs of those settings are tried that
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import combinations
-from types import MappingProxyType
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.options import spelled
@@ -81,30 +80,26 @@ def shares(error: Callable[[Reverted], float], changed: Sequence[str], change: f
 
 
 def explaining(
-    engine: Engine,
-    changed: Collection[str],
-    error_of: Callable[[Engine], float],
-    back: Mapping[str, str] = MappingProxyType({}),
-    change: float = 0.0,
+    engine: Engine, back: Mapping[str, str | None], error_of: Callable[[Engine], float], change: float = 0.0
 ) -> dict[str, float]:
     """The changed options of an engine that explain its error: `shares` by option and value, such as `linearDamping=0.04`.
 
     Args:
         engine: The engine with its changed options.
-        changed: Their names.
+        back: By the name of each, the value to which it is reverted; None if it is left out.
         error_of: The error of an engine; NaN if it is undefined.
-        back: The values to which they are reverted; the others are left out.
         change: As of `shares`.
     """
 
     def error(names: Reverted) -> float:
         left = engine.without(names)
+        reverted = {name: value for name in names if (value := back[name]) is not None}
         try:
-            return error_of(replace(left, options={**left.options, **{name: back[name] for name in names if name in back}}))
+            return error_of(replace(left, options={**left.options, **reverted}))
         except DropspinError:  # one of two settings that can be given together only
             return math.nan
 
-    found = shares(error, list(changed), change)
+    found = shares(error, list(back), change)
     return {", ".join(f"{name}={engine.options[name]}" for name in names): share for names, share in found.items()}
 
 

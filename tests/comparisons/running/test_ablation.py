@@ -21,7 +21,7 @@ def settings_that_explain(label, scene_name, metric, duration=None):
     options = written_out(entry, scene, 1e-3)
     written = type(entry.adapter)(options)
     changed = [name for name in options if name not in written.calibrated.options]
-    return explaining(written, changed, lambda chosen: measure(scene, simulate(scene, chosen, 1e-3))[metric])
+    return explaining(written, dict.fromkeys(changed), lambda chosen: measure(scene, simulate(scene, chosen, 1e-3))[metric])
 
 
 BOUNCE, DRIFT = ("drop-ball", "bounce_height_error", 0.9), ("fall-spin", "energy_drift", 0.3)

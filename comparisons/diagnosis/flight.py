@@ -30,13 +30,13 @@ def fall(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """The distance fallen in a second, and the terminal speed."""
     if not body.gravity > 0.0:
         return [Answer("fall", "gravity", "", detail="none")]
-    start, fallen, exact = body.start(), [], []
+    start, fallen = body.start(), []
     for dt in dts:
-        steps = round(FALL / dt)
-        end = body.motions(start[np.newaxis], dt, steps, -body.gravity * UP, floor=False)[0, -1]
-        fallen.append(start[1] - end[1])
-        exact.append(body.fallen(steps * dt))
-    free = 0.5 * body.gravity * (round(FALL / dts[0]) * dts[0]) ** 2
+        steps = math.ceil(round(FALL / dt, 9))
+        ends = body.motions(start[np.newaxis], dt, steps, -body.gravity * UP, floor=False)[0, -3:, 1]
+        at = 2.0 + (FALL - steps * dt) / dt  # a step that does not divide the time: on the parabola through the last three heights
+        fallen.append(start[1] - np.array([(at - 1.0) * (at - 2.0) / 2.0, at * (2.0 - at), at * (at - 1.0) / 2.0]) @ ends)
+    free, exact = 0.5 * body.gravity * FALL**2, [body.fallen(FALL)] * len(dts)
     answers = [judged(body, Answer("fall", "distance in 1 s", "m", physical=free), dts, fallen, exact)]
     if any(body.falls) and not body.unknown:
         speed = terminal_speed(body.gravity * (1.0 - body.lifted), body.mass, *body.falls)
@@ -49,14 +49,15 @@ def spin(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     answers = []
     for number, axis in enumerate(body.principal[1].T):
         direction, start = vector_text(axis), body.start(spin=SPEED * axis)
-        exact = body.slowed(number, SPEED)
-        if exact < TURN:
-            answer = Answer("spin", DECAY_TIME, "s", direction, physical=math.inf)
-            values = [_decay(body, start, dt, exact) for dt in dts]
+        decay = body.slowed(number, SPEED)
+        if decay < TURN:
+            answer, exact = Answer("spin", DECAY_TIME, "s", direction, physical=math.inf), [decay] * len(dts)
+            values = [_decay(body, start, dt, decay) for dt in dts]
         else:
-            answer, exact = Answer("spin", KEPT, "1", direction, physical=1.0), body.spun(number, SPEED, TURN) / SPEED
+            answer = Answer("spin", KEPT, "1", direction, physical=1.0)
+            exact = [body.spun(number, SPEED, round(TURN / dt) * dt) / SPEED for dt in dts]
             values = [float(np.linalg.norm(_turned(body, start, dt)[SPIN])) / SPEED for dt in dts]
-        answers.append(judged(body, answer, dts, values, [exact] * len(dts)))
+        answers.append(judged(body, answer, dts, values, exact))
     return answers
 
 

@@ -87,6 +87,13 @@ def test_gravcomp_of_a_welded_part_lifts_its_own_weight(tmp_path):
     assert found.remedies[0].text == '<body name="w" gravcomp="0"> (model.xml, line 1)'
 
 
+def test_distance_of_a_step_that_does_not_divide_a_second_is_that_in_a_second(tmp_path):
+    """Of semi-implicit Euler g t (t + dt) / 2."""
+    body = body_of(tmp_path, FREE.format('<geom size=".1"/>'), 'timestep="0.03"')
+    [answer] = fall(body, [0.03])
+    assert (answer.measured, answer.in_force) == (pytest.approx(0.5 * 9.81 * 1.03, rel=1e-9), pytest.approx(0.5 * 9.81))
+
+
 @pytest.mark.parametrize("gravcomp", [1, 2])
 def test_body_that_does_not_fall_has_answers_that_say_so(tmp_path, gravcomp):
     body = body_of(tmp_path, FREE.replace("<body", f'<body gravcomp="{gravcomp}"').format(LID))

@@ -95,6 +95,9 @@ class Link(NamedTuple):
             origin = self.position - rotate(turn, np.array(self.dynamics[3]))
         elements = self.element.every("visual" if visual else "collision")
         for (_, _, kind, sizes, _, place, own), element in zip(geometry, elements, strict=True):
+            if "concave" in element.attributes and kind == server().GEOM_MESH:
+                why = "a concave mesh, of which a body has triangles without volume; leave out concave to diagnose its convex hull"
+                raise DropspinError(f"{file.given}: line {element.line}: {why}.")
             shape, turns = _shape(file, kind, sizes, element), multiply(turn, np.array(own))
             if shape is not None:
                 position = origin + rotate(turn, np.array(place)) - centre + rotate(turns, shape.centre)

@@ -233,6 +233,14 @@ def test_a_file_that_is_wrong_is_refused_in_one_line(tmp_path, elements, message
     assert str(error.value).startswith("model.urdf: ")
 
 
+def test_concave_mesh_is_refused(tmp_path):
+    """Bullet's has no margin: it rests on the plane, not 1 mm above as a hull."""
+    (tmp_path / "mesh.obj").write_text(TETRAHEDRON, encoding="utf-8")
+    concave = link('<mesh filename="mesh.obj"/>').replace("<collision>", '<collision concave="yes">')
+    with pytest.raises(DropspinError, match="line 1: a concave mesh"):
+        body(tmp_path, concave)
+
+
 def test_the_server_holds_one_world(tmp_path):
     block = body(tmp_path, link(BOX))
     block.motions(block.start()[np.newaxis], DTS[0], 1, np.zeros(3), floor=False)

@@ -25,8 +25,8 @@ MARGINAL = 1.01
 """Ratio of the two levers up to which a body, such as a cube with a coefficient of friction of 1, is not said to tip."""
 LEANING = np.array([0.0, 0.01, 0.0101])
 """Angles by which the lever of the weight about the leading edge is found [rad]; an uneven load tilts a body at rest by less."""
-WAYS = ("0°", "45°")
-"""Directions of a slide, from an axis of the surface."""
+WAYS = {"0°": np.array([1.0, 0.0, 0.0]), "45°": math.sqrt(0.5) * np.array([1.0, 0.0, 1.0])}
+"""Directions of a slide, by their angle to an axis of the surface."""
 
 
 def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
@@ -41,20 +41,18 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         return [replace(blank, direction=way, detail=MOVES) for way in WAYS]
     end = body.settled[-1:]
     rests = [body.motions(end, dt, math.ceil(WATCHED / dt), -body.gravity * UP, floor=True)[0, -1] for dt in dts]
-    half = math.sqrt(0.5)
-    if any(_is_tipped(body, end[0], np.array(direction)) for direction in ((1.0, 0.0, 0.0), (half, 0.0, half))):
+    if any(_is_tipped(body, end[0], direction) for direction in WAYS.values()):
         return [replace(blank, direction=way, detail=TIPS) for way in WAYS]
     least = float(np.nanmin([body.friction, body.friction_across]))
     longest = SLIDE**2 / (2.0 * LONGEST_SLIDE * body.gravity)  # the friction of the longest slide
-    along = _stops(body, dts, rests, np.array([1.0, 0.0, 0.0]), body.friction)
-    across = _stops(body, dts, rests, np.array([half, 0.0, half]), max(least, longest))
-    if not along or not across:
+    each = zip(WAYS.items(), (body.friction, max(least, longest)), strict=True)
+    stops = {way: _stops(body, dts, rests, direction, friction) for (way, direction), friction in each}
+    if not all(stops.values()):
         return [replace(blank, direction=way, detail=TIPS) for way in WAYS]
-    ways = zip(WAYS, (along, across), strict=True)
-    answers = [judged(body, replace(blank, direction=way), dts, stops, [exact] * len(dts)) for way, stops in ways]
+    answers = [judged(body, replace(blank, direction=way), dts, found, [exact] * len(dts)) for way, found in stops.items()]
     if not math.isnan(body.friction_across):
-        turned = replace(blank, direction=WAYS[1], physical=math.nan)
-        return [answers[0], replace(turned, detail=long) if least < longest else replace(turned, measured=across[0])]
+        turned = replace(blank, direction="45°", physical=math.nan)
+        return [answers[0], replace(turned, detail=long) if least < longest else replace(turned, measured=stops["45°"][0])]
     if SLIDE / (body.friction * body.gravity) < LONG_SLIDE:
         answers = [_of_short_slide(one) for one in answers]
     return answers

@@ -87,7 +87,7 @@ def solid(shape: str, **sizes: Any) -> Shape:
 def mesh_shape(points: Array, faces: Faces) -> Shape:
     """A mesh as a solid, or as a surface if it is not closed or has vertices beyond its triangles."""
     is_solid = is_closed(points, faces) and is_whole(points, faces)
-    return solid("mesh", points=points, faces=faces, **({} if is_solid else {"inertia": "surface"}))
+    return solid("mesh", points=points, faces=faces, inertia="solid" if is_solid else "surface")
 
 
 def is_whole(points: Array, faces: Faces) -> bool:

@@ -61,8 +61,8 @@ class MuJoCoAlone:
         self.geoms = [geom for geom in range(old.ngeom) if old.geom_bodyid[geom] in self.group]
         self.names = list(file.names(GEOM))
         for geom in self.geoms:
-            if old.geom_type[geom] not in MODELLED:
-                raise Breakdown("declined", f"its geometry {self.names[geom]!r} is a {kind_of(old, geom)}, which is not modelled")
+            if (kind := kind_of(old, geom)) not in MODELLED:
+                raise Breakdown("declined", f"its geometry {self.names[geom]!r} is a {kind}, which is not modelled")
         surfaces = file.surfaces(on, self.geoms)
         self.surface, self.others = next(iter(surfaces), None), surfaces[1:]
         self.missed = file.missed(self.geoms)

@@ -10,7 +10,7 @@ from dropspin.comparisons.engines.mujoco_model import UPWARD
 from dropspin.scenarios.bodies import Shape
 from dropspin.scenarios.state import Array
 
-MODELLED = [int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}")) for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")]
+MODELLED = ("sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 """The kinds of geometries of bodies."""
 ALONG = 1e-3
 """Cosine up to which a direction is along a plane, and not into it."""

@@ -5,12 +5,11 @@ neither the motion nor the frames at rest tell them apart.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.logs.falling import flights_in_any_units
 from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, falls, positions
@@ -128,11 +127,12 @@ def log_check(recording: Flights | Log | str | Path, on_progress: Callable[[str,
         check = replace(check, findings=(*found, *of_lengths(flights.log)))
     if not check.reads_the_columns_right:
         return check
-    off = list(_of_offset(flights, values))
+    known = {value.name: value.is_identifiable for value in values}
+    off = list(_of_offset(flights, known))
     if off:  # the tracked point of a body that turns fast about another point seems not to fly
         found = [finding for finding in found if finding.kind not in ("no flight", "late")]
     found += [Finding("misread", toss=flight.toss.name, frame=frame) for flight in flights.found for frame in flight.misread]
-    found += [*_of_scale(flights, drag), *off, *_of_inertia(flights, drag, values), *of_floor(flights, ALARM)]
+    found += [*_of_scale(flights, drag), *off, *_of_inertia(flights, drag, known), *of_floor(flights, ALARM)]
     return replace(check, findings=tuple(found))
 
 
@@ -205,16 +205,10 @@ def _shown(*causes: tuple[Cause, bool]) -> tuple[Cause, ...]:
     return tuple(cause for cause, is_shown in causes if is_shown) or tuple(cause for cause, _ in causes)
 
 
-def _known(values: Sequence[Value], names: Sequence[str]) -> NDArray[np.bool_]:
-    """Whether each of the named values is identifiable."""
-    known = {value.name: value.is_identifiable for value in values}
-    return np.array([known[name] for name in names])
-
-
-def _of_offset(flights: Flights, values: Sequence[Value]) -> Iterator[Finding]:
+def _of_offset(flights: Flights, known: Mapping[str, bool]) -> Iterator[Finding]:
     """Of a centre of mass that is not where the header says, along the axes along which it is identifiable."""
     header, found = flights.log.header, flights.moving
-    off = np.where(_known(values, CENTRES), header.tracked_from_centre - found.values[OFFSET], 0.0)
+    off = np.where([known[name] for name in CENTRES], header.tracked_from_centre - found.values[OFFSET], 0.0)
     by_scale = abs(found.values[1] / header.gravity + 1.0) * float(np.linalg.norm(header.tracked_from_centre))
     is_off = np.abs(off) > found.half_widths(ALARM)[OFFSET] + by_scale
     if is_off.any():
@@ -234,20 +228,20 @@ def _rounded(values: Array) -> list[float]:
     return [round(value, 4) for value in values.tolist()]
 
 
-def _of_inertia(flights: Flights, drag: Regression, values: Sequence[Value]) -> Iterator[Finding]:
+def _of_inertia(flights: Flights, drag: Regression, known: Mapping[str, bool]) -> Iterator[Finding]:
     """Of ratios of moments of inertia that differ from the header's, and of drag, as far as they are identifiable."""
     found, body = flights.turning, flights.log.header.body
-    known = _known(values, RATIOS)
-    ratios = np.where(known, found.values, 0.0)
+    are_known = [known[name] for name in RATIOS]
+    ratios = np.where(are_known, found.values, 0.0)
     stretched = np.exp(0.5 * np.array([ratios[0], 0.0, ratios[1]]))
     keys = {"body.inertia": in_numbers(body.inertia_tensor * np.outer(stretched, stretched))}
     wide = found.half_widths(ALARM)
-    orders = tuple(_orders_that_fit(flights.log, ratios, np.where(known, wide, np.inf)))
+    orders = tuple(_orders_that_fit(flights.log, ratios, np.where(are_known, wide, np.inf)))
     causes = (*orders, Cause("other moments" if orders else "moments of inertia", keys=keys))
     for kind, value, error in zip(("inertia, x", "inertia, z"), ratios, wide, strict=True):
         if abs(value) > max(error, 0.01):
             yield Finding(kind, math.exp(value), 1.0, causes=causes)
-    if _known(values, ["drag"]).all() and drag.values[-1] > drag.half_widths(ALARM)[-1]:
+    if known["drag"] and drag.values[-1] > drag.half_widths(ALARM)[-1]:
         yield Finding("drag", float(drag.values[-1]), 0.0)
 
 

@@ -2,7 +2,6 @@
 // Pointer: values at the nearest point; drag: zoom; double click: whole plot. A legend entry hides its lines; with Shift, all others.
 "use strict";
 (() => {
-  const SVG = "http://www.w3.org/2000/svg";
   const [HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [230, 62, 12, 8, 40];
   const [CHARACTER, BESIDE] = [6.2, 30];  // pixels: the width of a digit of a tick, and the room for the name of the axis
   const NEAR = 40;           // pixels within which a point has its values shown
@@ -16,21 +15,6 @@
   };
   const RAISED = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
 
-  const made = (name, attributes = {}, ...children) => {
-    const element = document.createElement(name);
-    for (const [key, value] of Object.entries(attributes)) {
-      if (key.startsWith("on")) element.addEventListener(key.slice(2), value);
-      else element.setAttribute(key, value);
-    }
-    element.append(...children);
-    return element;
-  };
-  const drawn = (name, attributes, text = "") => {
-    const element = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-    element.textContent = text;
-    return element;
-  };
   const unpacked = (text) => new Float32Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
   const positions = (x) => (Array.isArray(x) ? x.map((value) => value ?? NaN) : Array.from({ length: x.count }, (_, i) => x.first + i * x.step));
 

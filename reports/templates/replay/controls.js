@@ -5,20 +5,6 @@
   const FRAMES_PER_TURN = 20;  // fewer do not show in which direction a body turns
   const HINT = "Drag: turn. Right-drag, Shift-drag: move. Wheel after a click: zoom. Keys: arrows, Shift-arrows, + −, 0 reset, Space play, comma/period frame, P/N impact, S slow at impacts, F follow.";
 
-  const made = (tag, attributes = {}, ...children) => {
-    const element = document.createElement(tag);
-    for (const [name, value] of Object.entries(attributes)) {
-      if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-      else element.setAttribute(name, value);
-    }
-    element.append(...children);
-    return element;
-  };
-  const drawn = (name, attributes) => {
-    const element = document.createElementNS("http://www.w3.org/2000/svg", name);
-    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-    return element;
-  };
   const labelled = (text, control) => made("label", {}, text + " ", control);
   const button = (text, label, onclick) => made("button", { type: "button", "aria-label": label, title: label, onclick }, text);
   const select = (pairs, chosen, onchange) => made("select", { onchange }, ...pairs.map(([value, text]) => {

@@ -4,6 +4,7 @@ Errors are stored for each flight. They are averaged over the start phases first
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -100,10 +101,9 @@ class Metric:
 
     def value_or_nan(self, cases: Sequence[Comparison]) -> float:
         """The value of the average; NaN if the time step is too coarse."""
-        try:
+        with suppress(Unresolved):
             return self.value(cases)
-        except Unresolved:
-            return float("nan")
+        return float("nan")
 
     def _of_each(self, measure: Measure, cases: Sequence[Comparison]) -> Array:
         """The values from each start phase, over the flights that all of them have, shape (phases, flights, …)."""

@@ -219,13 +219,11 @@ def _remove_if_abandoned(left: Path, target: Path) -> None:
     if left.is_symlink() or not left.is_dir():  # a link may lead to any folder
         left.unlink(missing_ok=True)
         return
-    try:
-        with FileLock(left / _LOCK, blocking=False):
-            if (left / OLD).exists() and not target.exists():
-                (left / OLD).rename(target)
-            shutil.rmtree(left, ignore_errors=True)
-    except (Timeout, NotImplementedError, OSError):  # its owner lives, or nobody can tell
-        return
+    # Unless its owner lives, or nobody can tell.
+    with suppress(Timeout, NotImplementedError, OSError), FileLock(left / _LOCK, blocking=False):
+        if (left / OLD).exists() and not target.exists():
+            (left / OLD).rename(target)
+        shutil.rmtree(left, ignore_errors=True)
 
 
 def read_stored(folder: Path, name: str) -> bytes:

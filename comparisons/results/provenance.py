@@ -6,6 +6,7 @@ import os
 import platform
 import subprocess
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
 from email import message_from_string
 from importlib.metadata import PackageNotFoundError, distribution
@@ -88,10 +89,9 @@ def processor() -> str:
 
 def _of_package(read: Callable[[str], str], package: str) -> str | None:
     """What is known of an installed package; None if it is missing."""
-    try:
+    with suppress(PackageNotFoundError):
         return read(package)
-    except PackageNotFoundError:
-        return None
+    return None
 
 
 def _wheel(package: str) -> str:

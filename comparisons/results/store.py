@@ -6,6 +6,7 @@ A folder may be damaged, or somebody else's: all of it is verified on loading, a
 import io
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -155,10 +156,9 @@ def _from_file(folder: Path, path: str, file: RunFile, read: Callable[[bytes], K
 
 def _writer(content: Any) -> str:
     """Which version of dropspin wrote a folder, as far as its run.json says."""
-    try:
+    with suppress(KeyError, TypeError):
         return f"dropspin {str(content['provenance']['versions']['dropspin'])[:20]}"
-    except (KeyError, TypeError):
-        return "another version of dropspin"
+    return "another version of dropspin"
 
 
 def _save_arrays(

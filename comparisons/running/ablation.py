@@ -7,6 +7,7 @@ threshold below which there is none: then pairs of those settings are tried that
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from itertools import combinations
@@ -94,10 +95,9 @@ def explaining(
     def error(names: Reverted) -> float:
         left = engine.without(names)
         reverted = {name: value for name in names if (value := back[name]) is not None}
-        try:
+        with suppress(DropspinError):  # for one of two settings that can be given together only
             return error_of(replace(left, options={**left.options, **reverted}))
-        except DropspinError:  # one of two settings that can be given together only
-            return math.nan
+        return math.nan
 
     found = shares(error, list(back), change)
     return {", ".join(f"{name}={engine.options[name]}" for name in names): share for names, share in found.items()}

@@ -144,10 +144,9 @@ class EngineProcesses:
 
     def _memory(self, label: str) -> int:
         """The memory that an engine's process has for data [bytes], which is limited; 0 where the system does not say."""
-        try:
+        with suppress(OSError):
             return memory_for_data(self._shared[label][0])
-        except OSError:
-            return 0
+        return 0
 
     def _end_group(self, label: str) -> None:
         """End the processes that an engine started and left."""
@@ -160,10 +159,9 @@ class EngineProcesses:
         process = self._shared[label][0]
         if not process or not PROCESSES.exists():
             return False
-        try:
+        with suppress(OSError):
             return (PROCESSES / str(process) / "stat").read_text().rpartition(")")[2].split()[0] == "Z"
-        except OSError:
-            return True
+        return True
 
     def renew(self, entry: EngineEntry) -> None:
         """Start a new process for an engine's next piece of work."""

@@ -95,9 +95,6 @@ class Link(NamedTuple):
             origin = self.position - rotate(turn, np.array(self.dynamics[3]))
         elements = self.element.every("visual" if visual else "collision")
         for (_, _, kind, sizes, _, place, own), element in zip(geometry, elements, strict=True):
-            if "concave" in element.attributes and kind == server().GEOM_MESH:
-                why = "a concave mesh, of which a body has triangles without volume; leave out concave to diagnose its convex hull"
-                raise DropspinError(f"{file.given}: line {element.line}: {why}.")
             shape, turns = _shape(file, kind, sizes, element), multiply(turn, np.array(own))
             if shape is not None:
                 position = origin + rotate(turn, np.array(place)) - centre + rotate(turns, shape.centre)
@@ -152,6 +149,9 @@ def read_links(file: UrdfFile, body: int) -> list[Link]:
             name, pose = bullet.getJointInfo(body, number)[12], bullet.getLinkState(body, number, computeForwardKinematics=True)
         read = bullet.getDynamicsInfo(body, number), bullet.getCollisionShapeData(body, number)
         found.append(Link(file.links[printable(name.decode())], *read, np.array(pose[0]), np.array(pose[1])))
+    for collision in (one for link in found for one in link.element.every("collision") if "concave" in one.attributes):
+        why = "a concave mesh, of which PyBullet has triangles without volume; leave out concave to diagnose its convex hull"
+        raise DropspinError(f"{file.given}: line {collision.line}: {why}.")
     return found
 
 

@@ -225,8 +225,12 @@ class MuJoCoFile:
         planes = [geom for geom in still if self.model.geom_type[geom] == PLANE]
         if not planes or (self.has_contacts and any(self._collide(own, geom) for geom in still)):
             return ""
-        why = "contacts are disabled" if not self.has_contacts else "no geometry of the body collides with it"
-        return f"{names[planes[0]]} does not hold it, because {why if own else 'the body has no geometry'}"
+        bodies = {mujoco.mj_id2name(self.model, BODY, self.model.geom_bodyid[geom]) for geom in own}
+        excluded = [f"{one.words} leaves out their contacts" for one in self.source.every("exclude") if bodies & {*one.attributes.values()}]
+        why = "contacts are disabled" if not self.has_contacts else [*excluded, "no geometry of the body collides with it"][0]
+        discards = option_setting(self.source, "compiler", "discardvisual", "false")
+        without = "the body has no geometry" + f", by {discards}" * ('"true"' in discards.text)
+        return f"{names[planes[0]]} does not hold it, because {why if own else without}"
 
     def left_out(self, own: Sequence[int]) -> str:
         """The geometries of the world that some collide with and that are no planes and boxes, if none of these is below; else empty."""

@@ -149,7 +149,9 @@ def read_links(file: UrdfFile, body: int) -> list[Link]:
             name, pose = bullet.getJointInfo(body, number)[12], bullet.getLinkState(body, number, computeForwardKinematics=True)
         read = bullet.getDynamicsInfo(body, number), bullet.getCollisionShapeData(body, number)
         found.append(Link(file.links[printable(name.decode())], *read, np.array(pose[0]), np.array(pose[1])))
-    for collision in (one for link in found for one in link.element.every("collision") if "concave" in one.attributes):
+    for collision in (
+        one for link in found for one in link.element.every("collision") if "concave" in one.attributes and [*one.every("mesh")]
+    ):
         why = "a concave mesh, of which PyBullet has triangles without volume; leave out concave to diagnose its convex hull"
         raise DropspinError(f"{file.given}: line {collision.line}: {why}.")
     return found

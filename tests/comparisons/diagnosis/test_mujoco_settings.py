@@ -245,14 +245,21 @@ def test_name_with_a_line_break_stays_on_one_line(tmp_path):
     assert body.name == r"b\n0 findings."
 
 
+EXCLUDED = '<contact><exclude body1="world" body2="b"/></contact>'
+HIDDEN = BOX.replace("/>", ' contype="0" conaffinity="0"/>')
+BARE = f'<inertial pos="0 0 0" mass="1" diaginertia="{numbers(MOMENTS)}"/>'
+
+
 @pytest.mark.parametrize(
     ("geom", "option", "why"),
     [
-        (BOX.replace("/>", ' contype="0" conaffinity="0"/>'), "", "no geometry of the body collides with it"),
-        (f'<inertial pos="0 0 0" mass="1" diaginertia="{numbers(MOMENTS)}"/>', "", "the body has no geometry"),
+        (HIDDEN, "", "no geometry of the body collides with it"),
+        (BARE, "", "the body has no geometry"),
         (BOX, '<option><flag contact="disable"/></option>', "contacts are disabled"),
+        (BOX, EXCLUDED, f"{EXCLUDED.removeprefix('<contact>').split('/')[0]}> (model.xml, line 1) leaves out their contacts"),
+        (BARE + HIDDEN, '<compiler discardvisual="true"/>', 'the body has no geometry, by discardvisual="true" (model.xml, line 1)'),
     ],
-    ids=["bits", "bare", "disabled"],
+    ids=["bits", "bare", "disabled", "excluded", "discarded"],
 )
 def test_body_that_falls_through_the_floor(tmp_path, geom, option, why):
     body = body_of(tmp_path, FREE.format(geom), head=option)

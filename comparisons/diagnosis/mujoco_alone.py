@@ -62,7 +62,7 @@ class MuJoCoAlone:
         self.names = list(file.names(GEOM))
         for geom in self.geoms:
             if (kind := kind_of(old, geom)) not in MODELLED:
-                raise Breakdown("declined", f"its geometry {self.names[geom]!r} is a {kind}, which is not modelled")
+                raise Breakdown("declined", f"its geometry {self.names[geom]!r} is a {kind}; give it as primitives or meshes")
         surfaces = file.surfaces(on, self.geoms)
         self.surface, self.others = next(iter(surfaces), None), surfaces[1:]
         self.missed = file.missed(self.geoms)

@@ -190,7 +190,8 @@ def diagnose(
 
             found = [*refusals, *results_in_parallel(pieces, of_body, crews, on_progress or ignore)]
             if all(body.declined for body in found):
-                raise DropspinError(" ".join(dict.fromkeys(body.breakdown for body in found)))
+                whys = (why if (why := body.breakdown).endswith(".") else f"{given}: {body.name}: {why}." for body in found)
+                raise DropspinError(" ".join(dict.fromkeys(whys)))
             return Diagnosis(given, tuple(found))
 
 

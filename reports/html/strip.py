@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dropspin.reports.replay.motions import Motion, Replay
+from dropspin.reports.replay.motions import Motion, Replay, Rows
 from dropspin.scenarios.bodies.hull import convex_hull
 from dropspin.scenarios.bodies.outline import Outline
 from dropspin.scenarios.rotations import rotate
@@ -54,31 +54,27 @@ def strip_of(replay: Replay) -> Strip:
     engines = replay.motions[:-1] if has_reference else replay.motions
     middle = last if has_reference else engines[0]
     moments = _moments(middle, replay.interval)
-    times, size, shape = list(moments.values()), replay.scene.body.size, replay.scene.body.outline
-    centres = middle.frames.position[[_row(middle, time) for time in times]]
+    times, size, shape = np.array(list(moments.values())), replay.scene.body.size, replay.scene.body.outline
+    centres = middle.frames.position[_rows(middle, times)]
     away = [_offsets(motion, times, centres, replay.interval) for motion in engines]
-    seen = [min(float(np.linalg.norm(offset)), FARTHEST * size) for offsets in away for offset in offsets if offset is not None]
-    pixels = RADIUS / (size + 0.5 * max(seen, default=0.0))
+    farthest = np.nanmax(np.minimum(np.linalg.norm(away, axis=-1), FARTHEST * size), initial=0.0)
+    pixels = RADIUS / (size + 0.5 * farthest)
 
-    def path(motion: Motion, offsets: Sequence[Array | None]) -> str:
-        drawn = []
-        for column, (time, offset) in enumerate(zip(times, offsets, strict=True)):
+    def path(motion: Motion, offsets: Array) -> str:
+        drawn, orientations = "", motion.frames.orientation[_rows(motion, times)]
+        for column, (orientation, offset) in enumerate(zip(orientations, offsets, strict=True)):
             origin = [LEFT, TOP] + PANEL * [column + 0.5, 0.5]
-            if offset is None:
-                continue
             if np.linalg.norm(offset) > FARTHEST * size:
-                drawn.append(_arrow(origin, offset))
-            else:
-                drawn.append(_body(shape, motion.frames.orientation[_row(motion, time)], origin, offset, pixels))
-        return "".join(drawn)
+                drawn += _arrow(origin, offset)
+            elif np.isfinite(offset).all():
+                drawn += _body(shape, orientation, origin, offset, pixels)
+        return drawn
 
-    rows = [(motion.label, motion.colour, path(motion, offsets)) for motion, offsets in zip(engines, away, strict=True)]
-    nowhere = [np.zeros(2)] * len(times)
     return Strip(
         moments=[f"{name}, {time:.3g} s" for name, time in moments.items()],
-        exact=path(last, nowhere) if has_reference else "",
+        exact=path(last, np.zeros((len(times), 2))) if has_reference else "",
         floor="" if replay.scene.floor is None else _floor(centres[:, 1] * pixels),
-        rows=rows,
+        rows=[(motion.label, motion.colour, path(motion, offsets)) for motion, offsets in zip(engines, away, strict=True)],
         reference=last.label if has_reference else "",
         difference=max((_difference(motion, times, size) for motion in engines), default=0.0),
         shows_impact="impact" in moments and not shape.radius,
@@ -96,23 +92,22 @@ def _moments(motion: Motion, interval: float) -> dict[str, float]:
     return {name: interval * round(time / interval) for name, time in found.items()}
 
 
-def _row(motion: Motion, time: float) -> int:
-    return int(np.argmin(np.abs(motion.frames.t - time)))
+def _rows(motion: Motion, times: Array) -> Rows:
+    """The frames that are nearest to times [s], shape (columns,)."""
+    return np.abs(motion.frames.t - times[:, None]).argmin(axis=1)
 
 
-def _offsets(motion: Motion, times: Sequence[float], centres: Array, interval: float) -> list[Array | None]:
-    """How far a body is from the middle of each panel, to the right and up [m]; None after its last state."""
-    offsets = []
-    for time, centre in zip(times, centres, strict=True):
-        away = motion.frames.position[_row(motion, time)] - centre
-        offsets.append(np.array([away @ RIGHT, away @ UP]) if motion.frames.t[-1] > time - interval else None)
-    return offsets
+def _offsets(motion: Motion, times: Array, centres: Array, interval: float) -> Array:
+    """How far a body is from the middle of each panel, to the right and up [m], shape (columns, 2); NaN after its last state."""
+    away = motion.frames.position[_rows(motion, times)] - centres
+    is_over = motion.frames.t[-1] <= times - interval
+    return np.where(is_over[:, None], np.nan, np.stack([away @ RIGHT, away @ UP], axis=1))
 
 
-def _difference(motion: Motion, times: Sequence[float], size: float) -> float:
+def _difference(motion: Motion, times: Array, size: float) -> float:
     if motion.errors is None:
         return 0.0
-    errors = motion.errors[[_row(motion, time) for time in times]] / [size, np.pi]
+    errors = motion.errors[_rows(motion, times)] / [size, np.pi]
     return float(min(np.nanmax(errors, initial=0.0), 1.0))
 
 

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from operator import itemgetter
-from typing import Any
+from typing import Any, get_args
 
 import pandas as pd
 
 from dropspin.comparisons.judging.convergence import STUDIES
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, OUTCOMES
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, Outcome
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
@@ -59,7 +59,7 @@ def html_report(
         legend=legend_of_marks(summary.statuses),
         explanations=explanations(results, summary.statuses),
         choice=CHOICE,
-        outcomes=list(dict.fromkeys(outcome for outcome, _ in OUTCOMES.values())),
+        outcomes=get_args(Outcome),
         plotted=len(charts),
         scenes=scenes,
         hero=_hero(results, scenes),

@@ -43,17 +43,11 @@ def _line(line: Line, reference: Line | None, xs: list[Array]) -> dict[str, Any]
     y = line.y.copy()
     if reference is not None and common:
         y[:common] -= reference.y[:common]
-    low, high = (None if values is None else _packed(values) for values in (line.low, line.high))
+    arrays = {"y": None if line.is_fill else y, "low": line.low, "high": line.high}
+    packed = {part: None if values is None else _packed(values) for part, values in arrays.items()}
     name = human_label(line.label)
-    drawn = {
-        "name": name if name != line.label else "",
-        "x": number,
-        "y": None if line.is_fill else _packed(y),
-        "low": low,
-        "high": high,
-        "common": common,
-    }
-    return _given(vars(line) | drawn | {"is_fill": False})
+    drawn = {"name": name if name != line.label else "", "x": number, "common": common, "is_fill": False}
+    return _given(vars(line) | packed | drawn)
 
 
 def _at_the_same(x: Array, reference: Array) -> Array:

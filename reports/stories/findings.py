@@ -4,14 +4,14 @@ import statistics
 from collections import Counter
 from collections.abc import Collection, Hashable, Iterator, Mapping
 from itertools import product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 
 from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, OUTCOMES, VERDICTS, with_reason
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS, Outcome, with_reason
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.results import SMALLEST_STATED, Results, Status, relative_sizes
@@ -199,7 +199,7 @@ def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], 
     for scene, status in sorted(statuses.items(), key=lambda item: -VERDICTS.index(item[1].verdict)):
         kinds[status.outcome, "setting error" if scene in remain and status.verdict in CONVERGING else status.reason] += 1
     parts = []
-    for outcome in dict.fromkeys(outcome for outcome, _ in OUTCOMES.values()):
+    for outcome in get_args(Outcome):
         reasons = {reason: count for (of, reason), count in kinds.items() if of == outcome}
         total = sum(reasons.values())
         because = ", ".join(reason if count == total else f"{reason} in {count}" for reason, count in reasons.items() if reason)

@@ -93,7 +93,6 @@ def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> li
         other = {name for name, digest in digests.items() if scenes.get(name, digest) != digest}
         scenes |= digests
         held = {engine: rows[~rows["scene"].isin(other)] for engine, rows in held.items()}
-        moved = {}
         for engine in one.engines:
             now = results_of[run][results_of[run]["engine"] == engine]
             earlier = held.get(engine, now.iloc[:0])
@@ -102,14 +101,12 @@ def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> li
             keys, is_gone = pd.MultiIndex.from_frame(change[KEY]), change["change"] == "gone"
             was_gone = is_gone & keys.isin(absent.get(engine, []))
             absent[engine] = [*set(absent.get(engine, [])).difference(keys), *keys[is_gone]]
-            moved[engine] = change.loc[change["change"].isin(CHANGED) & ~was_gone, KEY]
+            for number, rows in _since(change.loc[change["change"].isin(CHANGED) & ~was_gone, KEY], results_of[:run], now):
+                cause = attributed(rows, results[number], one, engine, unmoved_engines(results_in_common(results[number], one)))
+                found.append(Move(engine, number, run, rows, cause))
             stays = change["change"].isin(["same", "gone", "undefined"])
             kept, fresh = before.merge(change.loc[stays, KEY], on=KEY), now.merge(change.loc[~stays, KEY], on=KEY)
             held[engine] = pd.concat([earlier.drop(before.index), kept, fresh], ignore_index=True)
-        for engine, differing in moved.items():
-            for number, rows in _since(differing, results_of[:run], results_of[run]):
-                cause = attributed(rows, results[number], one, engine, unmoved_engines(results_in_common(results[number], one)))
-                found.append(Move(engine, number, run, rows, cause))
     return found
 
 

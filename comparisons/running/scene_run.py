@@ -50,21 +50,16 @@ def run_scene(
         stamp: The run's provenance.
         timings: The time that the engines' steps take.
     """
-    agreements: list[Measurement] = []
-    distances: list[Measurement] = []
     studies = [EngineStudy(own, entry, processes, on_progress) for entry in entries]
-    for dt in dts:
-        differences, from_other_laws = _at_step(own, studies, dt, timings, is_finest=dt == min(dts))
-        agreements += differences
-        distances += from_other_laws
+    of_steps = [_at_step(own, studies, dt, timings, is_finest=dt == min(dts)) for dt in dts]
+    agreements, distances = (list(chain(*rows)) for rows in zip(*of_steps, strict=True))
     by_label = {study.entry.label: study for study in studies}
-    for study in studies:
-        study.calibrated = by_label.get(calibrated_label(study.entry.label) or "")
     judged = []
     for study in studies:
+        study.calibrated = by_label.get(calibrated_label(study.entry.label) or "")
         rows = list(study.rows(is_extrapolated=is_sufficient(sorted(dts))))
         judged += [*rows, *study.explaining_settings(rows)]
-    return _results(own, studies, [*judged, *distances], agreements, stamp)
+    return _results(studies, [*judged, *distances], agreements, stamp)
 
 
 def _at_step(
@@ -111,14 +106,11 @@ def _distances_to_other_laws(
 
 
 def _results(
-    own: StartPhase,
-    studies: Sequence[EngineStudy],
-    judged: Sequence[Measurement],
-    agreements: Sequence[Measurement],
-    stamp: Mapping[str, Any],
+    studies: Sequence[EngineStudy], judged: Sequence[Measurement], agreements: Sequence[Measurement], stamp: Mapping[str, Any]
 ) -> Results:
     """The run of one scene as results: means of ensembles first, predicted errors and agreements in tables of their own."""
-    scene, truth = own.scene, own.truth.name if own.truth else ""
+    scene, known, *_ = studies[0].own
+    truth = known.name if known else ""
     means: list[Measurement] = []
     predictions: list[Measurement] = []
     trajectories: dict[TrajectoryKey, Trajectory] = {}

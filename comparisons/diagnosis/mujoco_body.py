@@ -42,6 +42,8 @@ LEVEL = 0.1
 DEFAULT_CONTACT: Changes = {name: spelled(CONTACT[name].default) for name in ("solref", "solimp")}
 NO_FLUID: Changes = {"density": 0.0, "viscosity": 0.0}
 
+SOLVED: Changes = {"iterations": 100, "ls_iterations": 50, "tolerance": 1e-8}
+"""Where MuJoCo's solver ends by default; with fewer iterations or a larger tolerance, it may end too early."""
 REMEDIES: Mapping[str, Changes] = {
     "damping": {"damping": 0.0, "armature": 0.0, "frictionloss": 0.0},  # a <freejoint/> has none of these
     "armature": {"armature": 0.0},
@@ -57,6 +59,7 @@ REMEDIES: Mapping[str, Changes] = {
     "sleep_tolerance": {"sleep_tolerance": 0.0},
     "solref": DEFAULT_CONTACT,
     "solimp": DEFAULT_CONTACT,
+    **dict.fromkeys(SOLVED, SOLVED),
 }
 
 ROUGH = 2.0
@@ -109,7 +112,9 @@ class MuJoCoBody(LooseBody):
         self._land()
         contact, sleep = self.in_file(*DEFAULT_CONTACT), ("sleep_tolerance",) * sleeps(option)
         softens = ("cone",) * (option.cone != ELLIPTIC and self.friction >= ROUGH)
-        of_contact = {"slide": contact, "roll": contact, "impact": softens, "rest": softens}
+        is_early = option.iterations < 100, option.ls_iterations < 50, option.tolerance > 1e-8
+        ends = [name for name, early in zip(SOLVED, is_early, strict=True) if early]
+        of_contact = {"slide": (*ends, *contact), "roll": (*ends, *contact), "impact": (*ends, *softens), "rest": (*ends, *softens)}
         self.causes = {question: (*sleep, *acting, *of_contact.get(question, ())) for question, acting in CAUSES.items()}
 
     def changed(self, changes: Changes) -> LooseBody:

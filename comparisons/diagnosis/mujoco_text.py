@@ -14,10 +14,12 @@ from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
 from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, pair_element
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, without
 from dropspin.comparisons.diagnosis.source import Element, Setting, tagged
-from dropspin.comparisons.engines.mujoco_settings import OF_GEOM
+from dropspin.comparisons.engines.mujoco_settings import OF_GEOM, OPTION
+from dropspin.comparisons.engines.options import spelled
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
 
+OF_MODEL = ("cone", "impratio", "density", "viscosity", "wind", "iterations", "ls_iterations", "tolerance")
 OF_JOINT = ("damping", "armature", "frictionloss")
 SAME = 1e-6
 """Relative difference up to which a moment of inertia is the one that was written."""
@@ -83,15 +85,7 @@ class BodyText:
     def settings(self) -> dict[str, Setting]:
         """The settings that matter, in the words of the file."""
         root, body = self.file.source, self.element
-        options = {
-            "timestep": "0.002",
-            "integrator": "Euler",
-            "cone": "pyramidal",
-            "impratio": "1",
-            "density": "0",
-            "viscosity": "0",
-            "wind": "0 0 0",
-        }
+        options = {"timestep": "0.002", "integrator": "Euler"} | {name: spelled(OPTION[name].default) for name in OF_MODEL}
         found = {name: option_setting(root, "option", name, default) for name, default in options.items()}
         found["sleep_tolerance"] = option_setting(root, "flag", "sleep", "disable")
         of_all = {name: option_setting(root, "option", f"o_{name}", "") for name in overrides(self.model)}

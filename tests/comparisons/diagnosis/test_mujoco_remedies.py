@@ -26,6 +26,17 @@ def test_ball_that_a_contact_slows_is_due_to_the_contact(tmp_path):
     assert [found.kind for found in answer.findings] == ["setting"]
 
 
+def test_slide_of_a_solver_that_ends_too_early_is_due_to_its_end(tmp_path):
+    """After one iteration the box slides 14.4 mm, with MuJoCo's own 100 the exact v²/2µg of 12.7 mm."""
+    ends = 'iterations="1" ls_iterations="1"'
+    body = body_of(tmp_path, FREE.format('<geom type="box" size=".1 .1 .03"/>'), f'{ends} cone="elliptic" impratio="10"')
+    found = [found for _, found in findings_of(body, slide)]
+    assert len(found) == 2
+    assert {name for one in found for name in one.settings} <= {"iterations", "ls_iterations"}
+    assert [one.remedies[0].value for one in found] == pytest.approx([0.01274] * len(found), rel=0.01)
+    assert 'iterations="100"' in found[0].remedies[0].text
+
+
 def test_change_after_which_nothing_is_measured_is_no_remedy(tmp_path):
     file = body_of(tmp_path, FREE.format(BOX.format("")))
 

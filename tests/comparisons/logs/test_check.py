@@ -308,8 +308,8 @@ def test_what_is_not_identifiable_gives_neither_a_finding_nor_a_remedy() -> None
     information = np.diag([0.06**-2, 0.01**-2])
     turning = Regression(np.array([-0.5, -0.4]), Noise(1e-3, 0.0), np.ones(1), information[np.newaxis], np.zeros((1, 2)), 1000)
     skewed = replace(flights, turning=turning)
-    values = tuple(checks._values(skewed, flights.moving))
-    [found] = checks._of_inertia(skewed, flights.moving, values)
+    known = {value.name: value.is_identifiable for value in checks._values(skewed, flights.moving)}
+    [found] = checks._of_inertia(skewed, flights.moving, known)
     assert found.kind == "inertia, z"
     before, after = np.array(flights.log.header.body.moments), np.array(cure(found)["body.inertia"])
     np.testing.assert_allclose(after / before, [1.0, 1.0, np.exp(-0.4)])

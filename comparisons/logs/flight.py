@@ -126,8 +126,8 @@ def falling_parts(toss: Toss, noise: float, acceleration: Array, pieces: Callabl
     size = window_size(toss, noise, acceleration)
     farthest = max(NEAR * float(length(acceleration)), ERRORS * standard_error(toss, size, noise))
     near = length(pieces(toss, size) - acceleration) < farthest
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
-    return [Flight(toss, int(first), int(end) + size - 1) for first, end in edges.reshape(-1, 2)]
+    edges = np.flatnonzero(np.diff(np.pad(near, 1))).reshape(-1, 2)
+    return [Flight(toss, int(first), int(end) + size - 1) for first, end in edges]
 
 
 def standard_error(toss: Toss, size: int, noise: float) -> float:

@@ -154,7 +154,7 @@ def load_log(recording: str | Path) -> Log:
         raise DropspinError(f"{given}: neither a column t nor the key rate says when the frames were taken; give one.")
     labels, first, index = np.unique(names, return_index=True, return_inverse=True)
     tosses = [_toss(where, header, str(labels[number]), columns, np.flatnonzero(index == number)) for number in np.argsort(first)]
-    return Log(header, tuple(tosses), given, tuple(_irregularities(header, tosses, "t" in columns)))
+    return Log(header, tuple(tosses), given, tuple(_irregularities(header, tosses)))
 
 
 def _toss(where: str, header: Header, name: str, columns: dict[str, Array], rows: NDArray[np.intp]) -> Toss:
@@ -193,14 +193,13 @@ def _without_jumps(quaternions: Array) -> Array:
     return quaternions * np.cumprod(np.concatenate([[1.0], signs]))[:, None]
 
 
-def _irregularities(header: Header, tosses: list[Toss], has_times: bool) -> Iterator[Finding]:
-    """What the rows and the times show; without a column of times, the rows alone."""
+def _irregularities(header: Header, tosses: list[Toss]) -> Iterator[Finding]:
+    """What the rows and the times show; times that follow from the rate of the header are even."""
     for toss in tosses:
         yield from _repeated(toss)
-        if has_times:
-            yield from _uneven(toss)
+        yield from _uneven(toss)
     rate = 1.0 / float(np.median(np.concatenate([np.diff(toss.t) for toss in tosses])))
-    if has_times and header.rate is not None and abs(rate / header.rate - 1.0) > OTHER_RATE:
+    if header.rate is not None and abs(rate / header.rate - 1.0) > OTHER_RATE:
         yield Finding("rate", rate, header.rate, causes=(Cause("times"), Cause("rate of the header", keys={"rate": rate})))
 
 
@@ -209,8 +208,7 @@ def _repeated(toss: Toss) -> Iterator[Finding]:
     steps = length(np.diff(toss.position, axis=0))
     equal = (steps == 0.0) & (np.diff(toss.orientation, axis=0) == 0.0).all(axis=1)
     moves = steps > MOVES * steps.max()
-    [edges] = np.nonzero(np.diff(np.concatenate([[False], equal, [False]])))
-    for begin, end in edges.reshape(-1, 2):
+    for begin, end in np.flatnonzero(np.diff(np.pad(equal, 1))).reshape(-1, 2):
         if begin > 0 and end < len(steps) and moves[begin - 1] and moves[end]:
             yield Finding("repeated", float(end - begin), 0.0, toss.name, int(begin) + 1)
 

@@ -73,8 +73,6 @@ def rests(log: Log) -> Rests:
     floor = log.header.floor_height
     heights = floor + np.array([toss.position[-FEWEST_FRAMES:, 1].mean() for toss in found])
     offsets = rotate(orientations[:, np.newaxis], body.vertices - log.header.tracked_from_centre)[..., 1]
-    if not found:
-        return Rests(orientations, heights, heights)
     lowest = offsets.min(axis=1, keepdims=True)
     # A face that is not quite level in the record rests as the mean of its corners does.
     level = np.mean(offsets, axis=1, where=offsets < lowest + LEVEL * body.size)

@@ -99,7 +99,7 @@ def _from_others(t: Array, values: Array) -> tuple[Array, Array]:
 def turn_by(vector: Array) -> Array:
     """The rotation by a rotation vector [rad], shape (3,), as a quaternion."""
     angle = float(np.linalg.norm(vector))
-    return about(vector / angle if angle > 0.0 else np.zeros(3), np.asarray(angle))
+    return about(vector / (angle or 1.0), np.asarray(angle))
 
 
 def rotation(flight: Flight, inertia: Array) -> Rotation:

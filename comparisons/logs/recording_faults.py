@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, SURPRISING, Flight, noise_of, surprise, window_size
+from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, SURPRISING, Flight, departures, noise_of, surprise, window_size
 from dropspin.comparisons.logs.flights import Flights, highest
 from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.log import Cause, Finding
@@ -20,6 +20,8 @@ MOST_NOISE, ALLOWED = 3.0, 0.1
 """Multiple of the noise of recorded rates, and share of their size, up to which they agree with the motion."""
 RESTS_NEAR = 0.04
 """Of the size of the body: how far above or below the floor it may rest, by errors of its own size and of tags."""
+BAD_FRAMES = (1, 2, 3)
+"""Numbers of bad frames that are tried."""
 DEGREE, BETTER = 5, 1.02
 """Degree of the polynomials that compare times with equal steps. Uneven times are right unless equal steps fit by this factor better."""
 
@@ -126,13 +128,27 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
 def _interrupted(flight: Flight, shared: Array, noise: Noise, *, by_bad_frames: bool) -> int:
     """How many frames are missing at the end of a flight, or are not of it: the number with which the next ones are of it; 0 if none."""
     dt = flight.toss.time_step
-    for number in (1, 2, 3):
+    for number in BAD_FRAMES if by_bad_frames else _likely_missing(flight, shared):
         # The last frame of a flight was left out before an impact; the frame after it is the first one that is not of the flight.
         first, delay = (flight.end + 1 + number, 0.0) if by_bad_frames else (flight.end + 1, number * dt)
         frames = range(first, min(first + 3, len(flight.toss)))
         if len(frames) == 3 and all(surprise(flight, frame, shared, noise, delay) < SURPRISING for frame in frames):
             return number
     return 0
+
+
+def _likely_missing(flight: Flight, shared: Array) -> Iterator[int]:
+    """The number of missing frames, of up to as many as the flight has, with which the next frames are nearest to it, if there are any.
+
+    Beyond so many frames, a flight predicts little.
+    """
+    toss, samples, next_ones = flight.toss, departures(flight, shared), np.arange(flight.end + 1, flight.end + 4)
+    if next_ones[-1] < len(toss):
+        numbers = np.arange(1, len(flight) + 1)
+        t = (toss.t[next_ones] - toss.t[flight.first] + numbers[:, np.newaxis] * toss.time_step)[..., np.newaxis]
+        start, velocity = np.polynomial.polynomial.polyfit(samples.t, samples.values, 1)
+        motion = start + velocity * t + shared[ACCELERATION] * t**2 / 2.0 + rotate(toss.orientation[next_ones], shared[OFFSET])
+        yield int(numbers[np.argmin(np.sum((toss.position[next_ones] - motion) ** 2, axis=(1, 2)))])
 
 
 def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:

@@ -45,12 +45,16 @@ def _values(finding: Finding) -> dict[str, Any]:
 
 
 def corrections(recording: str, findings: Iterable[Finding]) -> list[str]:
-    """What to correct in the header before engines are compared with a recording."""
+    """What to correct before engines are compared with a recording: in its header, or in its frames."""
+    findings = list(findings)
     sentences = [sentence(finding) for finding in findings if any(cause.keys for cause in finding.causes)]
     if sentences:
         sentences.append(
             f"Correct the header first: dropspin log check {recording} writes corrected.toml, with each remedy that is the only one."
         )
+    cut = [finding for finding in findings if finding.kind in ("frame dropped", "bad frame")]
+    if cut:
+        sentences.append(f"Flights that are cut at missing or wrong frames, although they continue: {len(cut)}. {sentence(cut[0])}")
     return sentences
 
 

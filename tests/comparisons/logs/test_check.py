@@ -15,6 +15,7 @@ from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.log import Finding, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression
 from dropspin.comparisons.logs.recording_faults import of_frames, of_rates
+from dropspin.reports.stories.log_findings import corrections
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
 from dropspin.scenarios.state import Array
@@ -205,14 +206,16 @@ def test_a_point_beside_the_centre_is_a_pair_of_alternatives() -> None:
     assert mass["body.inertia"] == pytest.approx(check.flights.log.header.body.moments)
 
 
-@pytest.mark.extended
-def test_a_missing_frame_is_named_with_its_place() -> None:
-    log = sound(count=8)
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("count", [9, 1])
+def test_missing_frames_are_named_with_their_place(count: int) -> None:
+    log = made(1, 5, NOISE, rate=240.0, durations=(0.25, 0.3), header={"body": CUBE}).log
     toss = log.tosses[3]
-    kept = np.delete(np.arange(len(toss)), 7)
-    shorter = replace(toss, t=toss.t[:-1], position=toss.position[kept], orientation=toss.orientation[kept])
+    kept = np.delete(np.arange(len(toss)), np.arange(30, 30 + count))
+    shorter = replace(toss, t=toss.t[:-count], position=toss.position[kept], orientation=toss.orientation[kept])
     found = only(log_check(replace(log, tosses=(*log.tosses[:3], shorter, *log.tosses[4:]))))
-    assert (found.kind, found.toss, found.value, found.frame) == ("frame dropped", "3", 1, 7)
+    assert (found.kind, found.toss, found.value, found.frame) == ("frame dropped", "3", count, 30)
+    assert "continue: 1. Toss 3: number of frames missing before frame 30" in corrections("toss.toml", [found])[0]
 
 
 @pytest.mark.extended

@@ -208,11 +208,10 @@ def _rows(label: str, found: Mapping[str, Array]) -> Iterator[Error]:
     """The errors of an engine as given."""
     values, floor = found["as given"], found["drawn starts"]
     lower, upper = intervals_of_means(values)
-    for number, kind in enumerate(KINDS):
-        low, high = interval_of_share(values[:, number]) if kind.quantity == "resting face" else (lower[number], upper[number])
-        value, noise = _mean(values[:, number]), _mean(floor[:, number])
-        tosses = int(np.isfinite(values[:, number]).sum())
-        yield Error(label, kind.quantity, kind.at, kind.unit, value, noise, float(low), float(high), tosses)
+    for kind, of_kind, drawn, *ends in zip(KINDS, values.T, floor.T, lower, upper, strict=True):
+        low, high = interval_of_share(of_kind) if kind.quantity == "resting face" else ends
+        tosses = int(np.isfinite(of_kind).sum())
+        yield Error(label, *kind, _mean(of_kind), _mean(drawn), float(low), float(high), tosses)
 
 
 def _mean(values: Array) -> float:
@@ -228,20 +227,18 @@ def _pairs(kind: Kind, found: Mapping[str, Mapping[str, Array]]) -> list[Pair]:
         return []
     differences = np.stack([found[one]["as given"][:, number] - found[other]["as given"][:, number] for one, other in names], axis=1)
     lower, upper = intervals_of_means(differences, simultaneous=True)
-    return [
-        Pair(kind.quantity, *pair, float(differences[:, column].mean()), float(lower[column]), float(upper[column]))
-        for column, pair in enumerate(names)
-    ]
+    each = zip(names, differences.T, lower.tolist(), upper.tolist(), strict=True)
+    return [Pair(kind.quantity, *pair, float(of_pair.mean()), low, high) for pair, of_pair, low, high in each]
 
 
 def _shares(label: str, found: Mapping[str, Array]) -> Iterator[Share]:
     """The parts of an engine's errors over the motion."""
     for kind in COMPARED:
         number = KINDS.index(kind)
-        chain = [(what, of_each[:, number]) for what, of_each in found.items() if what != "drawn starts"]
-        parts = [(what, before - after) for (_, before), (what, after) in pairwise(chain)]
+        improved = [(what, of_each[:, number]) for what, of_each in found.items() if what != "drawn starts"]
+        parts = [(what, before - after) for (_, before), (what, after) in pairwise(improved)]
         floor = found["drawn starts"][:, number]
-        parts += [("start", floor), ("remaining", chain[-1][1] - floor)]
+        parts += [("start", floor), ("remaining", improved[-1][1] - floor)]
         lower, upper = intervals_of_means(np.stack([values for _, values in parts], axis=1))
-        for column, (what, values) in enumerate(parts):
-            yield Share(label, kind.quantity, what, float(values.mean()), float(lower[column]), float(upper[column]))
+        for (what, values), low, high in zip(parts, lower.tolist(), upper.tolist(), strict=True):
+            yield Share(label, kind.quantity, what, float(values.mean()), low, high)

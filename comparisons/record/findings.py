@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -94,14 +94,12 @@ def read(folder: str | Path) -> dict[str, list[Release]]:
     Raises:
         DropspinError: The folder has no release that was measured here, or a file is refused.
     """
-    tables: dict[str, list[list[dict[str, Any]]]] = {}
-    for path in sorted((Path(folder) / OWN).glob("*.parquet")):
-        _, rows = stored(path)
-        tables.setdefault(rows[0]["engine"], []).append(rows)
-    if not tables:
+    files = [stored(path)[1] for path in sorted((Path(folder) / OWN).glob("*.parquet"))]
+    if not files:
         raise DropspinError(f"{folder}: has no release that was measured here; give a folder that dropspin record wrote.")
     found: dict[str, list[Release]] = {}
-    for engine, own in tables.items():
+    for engine in dict.fromkeys(rows[0]["engine"] for rows in files):
+        own = [rows for rows in files if rows[0]["engine"] == engine]
         machines = [tuple(rows[0][name] for name in MACHINE) for rows in own]
         [(most, _)] = Counter(machines).most_common(1)
         of_one_machine = [release_of(rows) for rows, machine in zip(own, machines, strict=True) if machine == most]

@@ -84,11 +84,9 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, conver
     budget = convergence.budget
     if math.isnan(budget.asymptotic_error) and not abs(convergence.finest_error) > negligible(scene, metric.unit):
         return None
-    verdict: Verdict = "measured" if budget.cause == "unresolved" else "passed"
+    verdict: Verdict = "measured" if budget.cause in ("unresolved", WITHIN_UNCERTAINTY, COMBINED) else "passed"
     reason = budget.reason
-    if budget.cause in (WITHIN_UNCERTAINTY, COMBINED):
-        verdict = "measured"
-    elif budget.cause in ("model", "setting"):
+    if budget.cause in ("model", "setting"):
         matching = matching_expectations(scene, claim.label, convergence.finest, metric)
         allowing = narrowest([expected for expected in matching if expected.engine is not None])
         bounds = [bounds_of(expected, metric) for expected in allowing]

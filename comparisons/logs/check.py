@@ -30,14 +30,15 @@ ALARM = 1e-4
 """Probability of a finding where there is nothing, of each value."""
 UNIT = 0.05
 """Largest relative difference from the ratio of two units."""
-LEAST_SCALE, ON_EARTH = 5e-4, 4e-3
-"""Relative differences of gravity: the least that is a finding, and about the largest between places on the Earth."""
+LEAST_SCALE, ON_EARTH, LEAST_DECAY = 5e-4, 4e-3, 0.01
+"""Relative differences of gravity: the least that is a finding, and about the largest between places on the Earth; and the least decay of
+the spin [1/s], which is larger than errors of integrators, and smaller than the damping of engines."""
 CENTRES = tuple(f"centre of mass, {axis}" for axis in "xyz")
 RATIOS = ("I_x / I_y over the header's", "I_z / I_y over the header's")
 """Names of values."""
 MOST_LOG = 300.0
 """Logarithm of which twice is near that of the largest number: values and intervals that are larger are not determined."""
-OF_SIZE, OF_RATIO, OF_DRAG = 0.1, 0.1, 0.5
+OF_SIZE, OF_RATIO, OF_DECAY = 0.1, 0.1, 0.5
 """Half widths of intervals beyond which a value counts as not identifiable: a share of the size, a logarithm, and [1/s]."""
 
 
@@ -229,13 +230,13 @@ def _rounded(values: Array) -> list[float]:
 
 
 def _of_inertia(flights: Flights, drag: Regression, known: Mapping[str, bool]) -> Iterator[Finding]:
-    """Of ratios of moments of inertia that differ from the header's, and of drag, as far as they are identifiable."""
-    found, body = flights.turning, flights.log.header.body
+    """Of ratios of moments of inertia that differ from the header's, of drag and lost spin, as far as they are identifiable."""
+    found, body = _turning(flights), flights.log.header.body
     are_known = [known[name] for name in RATIOS]
-    ratios = np.where(are_known, found.values, 0.0)
+    ratios = np.where(are_known, found.values[:2], 0.0)
     stretched = np.exp(0.5 * np.array([ratios[0], 0.0, ratios[1]]))
     keys = {"body.inertia": in_numbers(body.inertia_tensor * np.outer(stretched, stretched))}
-    wide = found.half_widths(ALARM)
+    wide = found.half_widths(ALARM)[:2]
     orders = tuple(_orders_that_fit(flights.log, ratios, np.where(are_known, wide, np.inf)))
     causes = (*orders, Cause("other moments" if orders else "moments of inertia", keys=keys))
     for kind, value, error in zip(("inertia, x", "inertia, z"), ratios, wide, strict=True):
@@ -243,6 +244,14 @@ def _of_inertia(flights: Flights, drag: Regression, known: Mapping[str, bool]) -
             yield Finding(kind, math.exp(value), 1.0, causes=causes)
     if known["drag"] and drag.values[-1] > drag.half_widths(ALARM)[-1]:
         yield Finding("drag", float(drag.values[-1]), 0.0)
+    if known["decay of the spin"] and found is flights.spinning:
+        yield Finding("spin decay", float(found.values[-1]), 0.0)
+
+
+def _turning(flights: Flights) -> Regression:
+    """Ratios of inertia: with the decay of the spin if there is any."""
+    decay, error = flights.spinning.values[-1], flights.spinning.half_widths(ALARM)[-1]
+    return flights.spinning if abs(decay) > max(error, LEAST_DECAY) else flights.turning
 
 
 def _orders_that_fit(log: Log, ratios: Array, wide: Array) -> Iterator[Cause]:
@@ -265,14 +274,15 @@ def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
     widths = np.where(flights.show_offset, wide[OFFSET], np.inf)
     for name, centre, error in zip(CENTRES, centres, widths, strict=True):
         yield Value(name, centre, centre - error, centre + error, "m", OF_SIZE * header.body.size)
-    turning = flights.turning
-    logarithms = np.clip([turning.values, turning.half_widths()], -MOST_LOG, MOST_LOG).T
+    turning = _turning(flights)
+    logarithms = np.clip([turning.values[:2], turning.half_widths()[:2]], -MOST_LOG, MOST_LOG).T
     for name, (value, error) in zip(RATIOS, logarithms.tolist(), strict=True):
         middle = math.exp(value)
         yield Value(name, middle, math.exp(value - error), math.exp(value + error), "", middle * math.sinh(OF_RATIO))
-    rate, error = drag.values[-1], drag.half_widths()[-1]
-    yield Value("drag", rate, rate - error, rate + error, "1/s", OF_DRAG)
-    for name, noise, unit in (("position", found.noise, "m"), ("orientation", turning.noise, "rad")):
+    for name, decaying in (("drag", drag), ("decay of the spin", flights.spinning)):
+        rate, error = decaying.values[-1], decaying.half_widths()[-1]
+        yield Value(name, rate, rate - error, rate + error, "1/s", OF_DECAY)
+    for name, noise, unit in (("position", found.noise, "m"), ("orientation", flights.turning.noise, "rad")):
         yield Value(f"white noise of {name}", noise.white, math.nan, math.nan, unit)
         yield Value(f"slow noise of {name}", noise.slow, math.nan, math.nan, f"{unit}/s^1.5")
 

@@ -1,6 +1,6 @@
 """All flights of a recording: what they share, and the state at the end of each."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -101,6 +101,11 @@ class Flights:
         sizes, axes = np.linalg.eigh(own)
         return np.linalg.norm(axes[:, sizes < 2.0 * by_noise], axis=1) < HIDDEN
 
+    @cached_property
+    def spinning(self) -> Regression:
+        """Ratios of inertia, and the rate at which the spin decays [1/s]."""
+        return _turning(self.rotations, ignore, with_decay=True)
+
     def starts(self) -> list[Start]:
         """The state at the end of each flight, by the header's gravity and centre of mass."""
         header = self.log.header
@@ -142,10 +147,12 @@ def flights_of(log: Log, acceleration: Array, report: Callable[[str, float], Non
     return Flights(log, moving, rotations, _turning(rotations, report))
 
 
-def _rotors(flights: Sequence[Flight], inertia: Array, report: Callable[[str, float], None], done: float = 0.0) -> Iterator[Rotation]:
+def _rotors(
+    flights: Sequence[Flight], inertia: Array, report: Callable[[str, float], None], done: float = 0.0, decay: float = 0.0
+) -> Iterator[Rotation]:
     """The rotor of each flight; the first ones take half of the work that is not done, because further ones may follow."""
     for number, flight in enumerate(flights, 1):
-        yield rotation(flight, inertia)
+        yield rotation(flight, inertia, decay)
         report(f"rotation of {number} of {len(flights)} flights", done + 0.5 * (1.0 - done) * number / len(flights))
 
 
@@ -155,19 +162,23 @@ def _sound(rotor: Rotation) -> Rotation:
     return rotation(replace(rotor.flight, misread=wrong), rotor.inertia) if wrong else rotor
 
 
-def _turning(rotations: Sequence[Rotation], report: Callable[[str, float], None]) -> Regression:
-    """Ratios of inertia, by derivatives at those that the flights show, if these are not those of the rotors."""
-    turning, moved = regression([rotor.samples for rotor in rotations]), np.zeros(2)
+def _turning(rotations: Sequence[Rotation], report: Callable[[str, float], None], *, with_decay: bool = False) -> Regression:
+    """Ratios of inertia, by derivatives at those that the flights show, if these are not those of the rotors; and a decay of the spin."""
+
+    def fitted(rotors: Iterable[Rotation]) -> Regression:
+        return regression([rotor.samples_with_decay if with_decay else rotor.samples for rotor in rotors])
+
+    largest = np.array([LARGEST_STEP, LARGEST_STEP, LARGEST_STEP / max(rotor.flight.duration for rotor in rotations)])[: 2 + with_decay]
+    turning, moved = fitted(rotations), np.zeros(3)
     for number in range(1, ROUNDS + 1):
         is_off = np.abs(turning.values) > turning.half_widths(SURELY)
-        moved += np.where(is_off, np.clip(turning.values, -LARGEST_STEP, LARGEST_STEP), 0.0)
+        moved[: 2 + with_decay] += np.where(is_off, np.clip(turning.values, -largest, largest), 0.0)
         if not is_off.any():
             break
         stretched = np.exp(0.5 * np.array([moved[0], 0.0, moved[1]]))
         inertia = rotations[0].inertia * np.outer(stretched, stretched)
-        rotors = _rotors([rotor.flight for rotor in rotations], inertia, report, 1.0 - 0.5**number)
-        turning = regression([rotor.samples for rotor in rotors])
-    return replace(turning, values=turning.values + moved)
+        turning = fitted(_rotors([rotor.flight for rotor in rotations], inertia, report, 1.0 - 0.5**number, moved[2]))
+    return replace(turning, values=turning.values + moved[: 2 + with_decay])
 
 
 def _above_floor(header: Header, flights: list[Flight]) -> list[Flight]:

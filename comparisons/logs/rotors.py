@@ -30,12 +30,14 @@ class Rotation:
         inertia: Inertia in the body frame, of any unit, shape (3, 3).
         orientation: At the middle one of the flight's rows, shape (4,).
         spin: At that time, in the world frame [rad/s], shape (3,).
+        decay: Rate at which the angular momentum decays [1/s].
     """
 
     flight: Flight
     inertia: Array
     orientation: Array
     spin: Array
+    decay: float = 0.0
 
     @property
     def middle(self) -> float:
@@ -45,7 +47,13 @@ class Rotation:
     def __call__(self, t: Array, faster: Array | None = None, inertia: Array | None = None) -> tuple[Array, Array]:
         """Orientations and spins at times from the first frame on [s]; `faster` is added to the spin [rad/s], shape (3,)."""
         spin = self.spin if faster is None else self.spin + faster
-        return free_rotor(self.inertia if inertia is None else inertia, self.orientation, spin)(t - self.middle)
+        free = free_rotor(self.inertia if inertia is None else inertia, self.orientation, spin)
+        if self.decay == 0.0:
+            return free(t - self.middle)
+        # Euler's equations are of second degree in the spin, so that one that decays by exp(-kt) is a free one at the time ∫ exp(-kt) dt.
+        lost = -np.expm1(-self.decay * (t - self.middle))
+        orientations, spins = free(lost / self.decay)
+        return orientations, spins * (1.0 - lost)[:, np.newaxis]
 
     def own_columns(self, t: Array) -> tuple[Array, Array]:
         """Derivatives of rotation vectors and spins, shape (n, 3, 6) each, by a turn of the whole motion [rad] and by the spin [rad/s]."""
@@ -70,6 +78,14 @@ class Rotation:
             ratios.append(rotation_vector(early, late) / (2.0 * TURN))
         measured = rotation_vector(self(t)[0], self.flight.toss.orientation[self.flight.rows])
         return Samples(t, measured, self.own_columns(t)[0], np.stack(ratios, axis=2))
+
+    @cached_property
+    def samples_with_decay(self) -> Samples:
+        """The same with a third shared parameter, the decay [1/s]."""
+        t, step = self.flight.t, TURN / self.flight.duration
+        (late, _), (early, _) = (replace(self, decay=self.decay + change)(t) for change in (step, -step))
+        decayed = rotation_vector(early, late) / (2.0 * step)
+        return replace(self.samples, shared=np.concatenate([self.samples.shared, decayed[..., np.newaxis]], axis=2))
 
 
 def misread(rotor: Rotation) -> tuple[int, ...]:
@@ -102,13 +118,13 @@ def turn_by(vector: Array) -> Array:
     return about(vector / (angle or 1.0), np.asarray(angle))
 
 
-def rotation(flight: Flight, inertia: Array) -> Rotation:
-    """The rotor nearest to a flight: of its middle frames first, then of four times as many."""
+def rotation(flight: Flight, inertia: Array, decay: float = 0.0) -> Rotation:
+    """The rotor nearest to a flight, with a decay [1/s]: of its middle frames first, then of four times as many."""
     t, orientation = flight.t, flight.toss.orientation[flight.rows]
     middle, reach = len(t) // 2, min(2, len(t) // 2 - 1)
     vectors = rotation_vector(orientation[middle], orientation[middle - reach : middle + reach + 1])
     own = t[middle - reach : middle + reach + 1] - t[middle]
-    found = Rotation(flight, inertia, orientation[middle], vectors.T @ own / float(own @ own))
+    found = Rotation(flight, inertia, orientation[middle], vectors.T @ own / float(own @ own), decay)
     while True:
         near = slice(max(0, middle - reach), middle + reach + 1)
         columns = found.own_columns(t[near])[0].reshape(-1, 6)

@@ -23,7 +23,7 @@ DIGITS = 2
 MOST_ALIKE = 3
 """Largest number of findings of one kind that a terminal shows."""
 SPINNING = "tosses of 0.3 s that spin at 8 rad/s or more, about different axes"
-NEEDS = dict.fromkeys(RATIOS, SPINNING) | {"drag": "longer flights"}
+NEEDS = dict.fromkeys(RATIOS, SPINNING) | {"drag": "longer flights", "decay of the spin": SPINNING}
 """What a recording needs for a value to be identifiable, by the name of the value."""
 MOST_RATIO = 10.0
 """Times the useful half width from which on more tosses are no advice: a hundred times as many."""

@@ -40,6 +40,7 @@ def _values(finding: Finding) -> dict[str, Any]:
     value, expected = finding.value, finding.expected
     numbers: dict[str, Any] = {"mm": 1e3 * value, "ms": 1e3 * value, "expected_ms": 1e3 * expected, "rests_mm": 1e3 * finding.rests}
     numbers |= {"mm_off": abs(1e3 * value), "side": "below" if value < 0.0 else "above"}
+    numbers |= {"size": abs(value), "decays": "grows" if value < 0.0 else "decays"}
     numbers |= {"degrees": math.degrees(value), "percent": 100.0 * value, "expected_percent": 100.0 * expected}
     return vars(finding) | numbers
 

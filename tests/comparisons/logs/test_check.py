@@ -458,6 +458,22 @@ def _twice_integrated(toss: Toss) -> Any:
     return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 
 
+@pytest.mark.parametrize("decay", [0.3, -0.1])
+def test_a_spin_that_decays_or_grows_is_measured(decay: float) -> None:
+    """In closed form: a cube turns about a fixed axis by ω (1 - exp(-kt)) / k."""
+    random = np.random.default_rng(7)
+
+    def slowed(toss: Toss) -> Any:
+        turns = np.outer(-np.expm1(-decay * toss.t) / decay, random.normal(size=3) * 8.0) + NOISE[1] * random.normal(size=(len(toss), 3))
+        return turned(turns, np.tile([0.0, 0.0, 0.0, 1.0], (len(toss), 1)))
+
+    check = log_check(changed(made(1, 8, NOISE, durations=(0.3, 0.4), header={"body": CUBE}).log, orientation=slowed))
+    [value] = [value for value in check.values if value.name == "decay of the spin"]
+    assert only(check).kind == "spin decay"
+    assert value.low < decay < value.high
+    assert value.half_width < 0.02
+
+
 def test_a_bad_frame_is_named_and_not_a_late_flight() -> None:
     log = made(1, 10, NOISE, durations=(0.3, 0.4), header={"body": CUBE}).log
     bad = log.tosses[3].position.copy()

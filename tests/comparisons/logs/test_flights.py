@@ -13,7 +13,8 @@ from dropspin.comparisons.logs.flight import LONGEST, SURPRISING, Flight, falls,
 from dropspin.comparisons.logs.flights import Flights, Start, flights_of
 from dropspin.comparisons.logs.log import Log, Toss
 from dropspin.comparisons.logs.noise import Noise
-from dropspin.scenarios.rotations import rotation_vector
+from dropspin.comparisons.logs.rotors import Rotation
+from dropspin.scenarios.rotations import rotate, rotation_vector, unrotate
 from dropspin.scenarios.state import Array
 
 DOWN = np.array([0.0, -9.81, 0.0])
@@ -137,6 +138,18 @@ def test_a_toss_that_errs_much_more_than_the_others_does_not_move_the_result() -
     after = found(recording.log)
     assert after.moving.weights[3] < 0.25
     assert np.abs(after.moving.values - before.moving.values)[1] < 0.25 * 3.0 / 20.0
+
+
+def test_a_rotor_that_decays_loses_angular_momentum_alone() -> None:
+    # R I Rᵀ ω = exp(-kt) L, and R turns with ω: differences of 2e-6 s leave a tenth of its square, and rounding 1e-16 / 1e-6.
+    inertia, start, t, step = np.diag(BRICK["inertia"]), np.array([0.5] * 4), np.linspace(-0.2, 0.3, 6), 1e-6
+    flight = Flight(Toss("1", np.arange(3.0), np.zeros((3, 3)), np.zeros((3, 4))), 0, 1)
+    rotor = Rotation(flight, inertia, start, np.array([3.0, 8.0, -2.0]), 3.0)
+    orientation, spin = rotor(t)
+    momentum = rotate(orientation, unrotate(orientation, spin) @ inertia)
+    first = rotate(start, unrotate(start, rotor.spin) @ inertia)
+    np.testing.assert_allclose(momentum, np.exp(-3.0 * t)[:, np.newaxis] * first, rtol=1e-10)
+    np.testing.assert_allclose(rotation_vector(rotor(t - step)[0], rotor(t + step)[0]) / (2.0 * step), spin, rtol=0.0, atol=1e-7)
 
 
 def test_a_frame_is_predicted_from_at_most_as_many_frames_as_a_regression_uses() -> None:

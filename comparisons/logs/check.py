@@ -255,9 +255,9 @@ def _turning(flights: Flights) -> Regression:
 
 
 def _orders_that_fit(log: Log, ratios: Array, wide: Array) -> Iterator[Cause]:
-    """The orders of the body's axes with which the ratios of its moments are as measured: logarithms over the header's, shape (2,)."""
+    """The orders of the body's axes, and a constant spin, with which ratios are as measured: logarithms over the header's, shape (2,)."""
     own = np.diag(log.header.body.inertia_tensor)
-    for inertia, cause in orders_of_axes(log):
+    for inertia, cause in (*orders_of_axes(log), (np.eye(3), Cause("constant spin"))):
         changes = np.log(np.diag(inertia) / own)
         if (np.abs(changes[[0, 2]] - changes[1] - ratios) <= wide).all():
             yield cause

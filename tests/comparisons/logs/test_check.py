@@ -173,6 +173,15 @@ def test_two_edges_that_are_exchanged_and_other_moments_are_alternatives() -> No
     assert check.findings
 
 
+def test_a_constant_spin_of_a_brick_is_an_alternative_to_equal_moments() -> None:
+    log = made(2, 8, NOISE, spin=8.0, header={"body": CUBE}).log  # a cube turns so
+    check = log_check(replace(log, header=made(1, 0).log.header))
+    assert {found.kind for found in check.findings} == {"inertia, x", "inertia, z"}
+    for found in check.findings:
+        assert [cause.name for cause in found.causes] == ["constant spin", "other moments"]
+    assert check.corrected == check.flights.log.header
+
+
 @pytest.mark.extended
 def test_a_bar_along_another_axis_than_a_cylinder_is_named_without_a_key() -> None:
     body = {"shape": "cylinder", "radius": 0.05, "half_length": 0.2, "mass": 1.0}

@@ -30,9 +30,8 @@ ALARM = 1e-4
 """Probability of a finding where there is nothing, of each value."""
 UNIT = 0.05
 """Largest relative difference from the ratio of two units."""
-LEAST_SCALE, ON_EARTH, LEAST_DECAY = 5e-4, 4e-3, 0.01
-"""Relative differences of gravity: the least that is a finding, and about the largest between places on the Earth; and the least decay of
-the spin [1/s], which is larger than errors of integrators, and smaller than the damping of engines."""
+LEAST_SCALE, LEAST_DECAY = 5e-4, 0.01
+"""The least relative difference of gravity and the least decay of the spin [1/s] that are findings; engines have a larger damping."""
 CENTRES = tuple(f"centre of mass, {axis}" for axis in "xyz")
 RATIOS = ("I_x / I_y over the header's", "I_z / I_y over the header's")
 """Names of values."""
@@ -194,8 +193,7 @@ def _of_scale(flights: Flights, drag: Regression) -> Iterator[Finding]:
         at_rest, spread, _, _ = rests(flights.log).scale()
         by_length, by_rate = (abs(at_rest - expected) < 4.0 * spread + 0.004 for expected in (ratio, 1.0))
         local = Cause("local gravity", keys={"gravity": float(f"{-fall:.4g}")})
-        causes = _shown((_length_cause(header, ratio), by_length), (_rate_cause(flights.log, ratio), by_rate))
-        causes += (local,) if abs(ratio - 1.0) < ON_EARTH else ()
+        causes = _shown((_length_cause(header, ratio), by_length), (_rate_cause(flights.log, ratio), by_rate), (local, by_rate))
         yield Finding("scale", -fall, header.gravity, causes=causes, rests=at_rest)
     if math.hypot(x, z) > math.hypot(wide[0], wide[2]):
         yield Finding("tilt", math.atan2(math.hypot(x, z), -fall), 0.0, causes=(Cause("axes"), Cause("push")))

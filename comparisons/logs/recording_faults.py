@@ -33,7 +33,7 @@ def of_rates(flights: Flights) -> Iterator[Finding]:
     spun = [(flight, flight.toss.angular_velocity, rotor(flight.t)[1]) for flight, rotor in rated]
     frame, upright = Cause("spin frame", keys={"spin_frame": "body" if in_world else "world"}), np.array(UPRIGHT[flights.log.header.up])
     if flights.turning.noise.white < UNTRACKED:
-        yield from _of_column("spin", spun, flights.turning.noise.white, frame, upright)
+        yield from _of_column("spin", spun, flights.turning.noise.white, frame, upright, in_body=not in_world)
     moved = [(flight, flight.toss.velocity, _velocities(flight, rates, flights.log.header)) for flight, _, rates in spun]
     yield from _of_column("velocity", moved, flights.moving.noise.white, Cause("velocity frame"), upright)
 
@@ -49,7 +49,13 @@ def _velocities(flight: Flight, spins: Array, header: Header) -> Array:
 
 
 def _of_column(
-    kind: str, columns: Sequence[tuple[Flight, Array | None, Array]], white: float, frame: Cause, upright: Array
+    kind: str,
+    columns: Sequence[tuple[Flight, Array | None, Array]],
+    white: float,
+    frame: Cause,
+    upright: Array,
+    *,
+    in_body: bool = False,
 ) -> Iterator[Finding]:
     """Of recorded rates that differ from those of the motion: a finding for each of the fewest causes with which they agree.
 
@@ -59,6 +65,7 @@ def _of_column(
         white: The white noise of the poses.
         frame: The cause that the rates are in the other frame.
         upright: The rotation from the axes of the recording, a quaternion.
+        in_body: Whether the header says that they are in the frame of the body.
     """
     known = [(flight, given[flight.rows], exact, given[flight.first : flight.end]) for flight, given, exact in columns if given is not None]
     if not known:
@@ -77,14 +84,19 @@ def _of_column(
     if explained(given, 1.0):
         return
     found: list[tuple[Cause | None, ...]] = []
-    of_body, of_world = rotate(turned, unrotate(upright, given)), rotate(upright, unrotate(turned, given))  # if they were of the other
-    for in_frame, rates in (((), given), ((frame,), of_body), ((frame,), of_world)):
-        factor = float(np.sum(rates * exact)) / (float(np.sum(exact**2)) or 1.0)
-        is_scaled = abs(abs(factor) - 1.0) > ALLOWED
-        if factor != 0.0 and explained(rates, factor):
-            in_degrees = kind == "spin" and abs(math.radians(abs(factor)) - 1.0) < ALLOWED
-            unit = Cause("degrees" if in_degrees else f"unit of the {kind}", abs(factor) - 1.0)
-            found.append((*in_frame, *[Cause(f"sign of the {kind}")] * (factor < 0.0), *[unit] * is_scaled))
+    frames = [(), (frame,)][:: -1 if in_body else 1]
+    recorded = unrotate(turned if in_body else upright, given)
+    # A mirror that reverses an axis leaves the component of a spin along it alone; no more is tried of velocities.
+    for axis in ("", *"xyz") if kind == "spin" else ("",):
+        columns_read = recorded * [1.0 if axis in ("", other) else -1.0 for other in "xyz"]
+        for in_frame, rates in zip(frames, (rotate(upright, columns_read), rotate(turned, columns_read)), strict=True):
+            factor = float(np.sum(rates * exact)) / (float(np.sum(exact**2)) or 1.0)
+            is_scaled = abs(abs(factor) - 1.0) > ALLOWED
+            if factor != 0.0 and explained(rates, factor):
+                in_degrees = kind == "spin" and abs(math.radians(abs(factor)) - 1.0) < ALLOWED
+                unit = Cause("degrees" if in_degrees else f"unit of the {kind}", abs(factor) - 1.0)
+                mirror = [Cause(f"mirror {axis}")] if axis else []
+                found.append((*in_frame, *mirror, *[Cause(f"sign of the {kind}")] * (factor < 0.0), *[unit] * is_scaled))
     difference = float(np.median(length(given - exact))) / size
     for cause in min(found, key=len, default=(None,)):
         yield Finding(kind, difference, 0.0, causes=() if cause is None else (cause,))

@@ -15,7 +15,7 @@ from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.log import Finding, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression
 from dropspin.comparisons.logs.recording_faults import of_frames, of_rates
-from dropspin.reports.stories.log_findings import corrections
+from dropspin.reports.stories.log_findings import corrections, sentence
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
 from dropspin.scenarios.state import Array
@@ -356,6 +356,9 @@ def test_each_error_of_recorded_rates_is_named_and_no_unit_that_does_not_explain
         assert [dict(cause.keys) for cause in found[0].causes] in ([], [{"spin_frame": "body"}])
         return [tuple(cause.name for cause in finding.causes) for finding in found]
 
+    of_world = list(rates_of(check.flights, angular_velocity=lambda toss: toss.angular_velocity * [-1.0, 1.0, -1.0]))
+    assert "the signs of wx and wz are reversed" in sentence(only(replace(check, findings=tuple(of_world))))
+    assert causes(lambda spin: spin * [-1.0, -1.0, 1.0]) == [("spin frame",), ("mirror z",)]
     assert causes(np.degrees) == [("spin frame",), ("degrees",)]
     assert causes(lambda spin: -1e3 * spin) == [("spin frame",), ("sign of the spin",), ("unit of the spin",)]
     assert causes(lambda spin: 10.0 * spin[:, [1, 2, 0]]) == [()]

@@ -18,7 +18,7 @@ from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
 from dropspin.comparisons.logs.log import Cause, Finding, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
 from dropspin.comparisons.logs.other_readings import in_other_readings, of_lengths, of_quaternions, orders_of_axes
-from dropspin.comparisons.logs.recording_faults import of_floor, of_frames, of_rates
+from dropspin.comparisons.logs.recording_faults import of_floor, of_frames, of_rates, ratios_of_rates
 from dropspin.comparisons.logs.rest import rests
 from dropspin.comparisons.running.inputs import ignore
 from dropspin.scenarios.bodies.inertia import in_numbers
@@ -280,6 +280,7 @@ def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
     for name, decaying in (("drag", drag), ("decay of the spin", flights.spinning)):
         rate, error = decaying.values[-1], decaying.half_widths()[-1]
         yield Value(name, rate, rate - error, rate + error, "1/s", OF_DECAY)
+    yield from (Value(*ratio, "") for ratio in ratios_of_rates(flights))
     for name, noise, unit in (("position", found.noise, "m"), ("orientation", flights.turning.noise, "rad")):
         yield Value(f"white noise of {name}", noise.white, math.nan, math.nan, unit)
         yield Value(f"slow noise of {name}", noise.slow, math.nan, math.nan, f"{unit}/s^1.5")

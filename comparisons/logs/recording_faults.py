@@ -8,6 +8,7 @@ import numpy as np
 from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, SURPRISING, Flight, departures, noise_of, surprise, window_size
 from dropspin.comparisons.logs.flights import Flights, highest
 from dropspin.comparisons.logs.header import UPRIGHT, Header
+from dropspin.comparisons.logs.intervals import intervals_of_means
 from dropspin.comparisons.logs.log import Cause, Finding
 from dropspin.comparisons.logs.noise import Noise
 from dropspin.comparisons.logs.other_readings import UNTRACKED
@@ -15,6 +16,8 @@ from dropspin.comparisons.logs.rest import rests
 from dropspin.comparisons.running.foreign_motions import missing_frames
 from dropspin.scenarios.rotations import cross, length, rotate, unrotate
 from dropspin.scenarios.state import Array
+
+_Rated = Sequence[tuple[Flight, Array | None, Array]]
 
 MOST_NOISE, ALLOWED = 3.0, 0.1
 """Multiple of the noise of recorded rates, and share of their size, up to which they agree with the motion."""
@@ -28,14 +31,29 @@ DEGREE, BETTER = 5, 1.02
 
 def of_rates(flights: Flights) -> Iterator[Finding]:
     """Of recorded velocities and spins that are not those of the positions and quaternions: in another frame or unit, or reversed."""
-    each, in_world = zip(flights.found, flights.rotations, strict=True), flights.log.header.spin_frame == "world"
-    rated = [pair for pair in each if pair[0].toss.angular_velocity is not None or pair[0].toss.velocity is not None]
-    spun = [(flight, flight.toss.angular_velocity, rotor(flight.t)[1]) for flight, rotor in rated]
-    frame, upright = Cause("spin frame", keys={"spin_frame": "body" if in_world else "world"}), np.array(UPRIGHT[flights.log.header.up])
+    in_world, upright = flights.log.header.spin_frame == "world", np.array(UPRIGHT[flights.log.header.up])
+    frame, (spun, moved) = Cause("spin frame", keys={"spin_frame": "body" if in_world else "world"}), _rated(flights)
     if flights.turning.noise.white < UNTRACKED:
         yield from _of_column("spin", spun, flights.turning.noise.white, frame, upright, in_body=not in_world)
-    moved = [(flight, flight.toss.velocity, _velocities(flight, rates, flights.log.header)) for flight, _, rates in spun]
     yield from _of_column("velocity", moved, flights.moving.noise.white, Cause("velocity frame"), upright)
+
+
+def _rated(flights: Flights) -> tuple[_Rated, _Rated]:
+    """Each flight with its recorded spins, and with its velocities, if it has any, and with those of the motion in its rows."""
+    each = zip(flights.found, flights.rotations, strict=True)
+    rated = [pair for pair in each if pair[0].toss.angular_velocity is not None or pair[0].toss.velocity is not None]
+    spun = [(flight, flight.toss.angular_velocity, rotor(flight.t)[1]) for flight, rotor in rated]
+    return spun, [(flight, flight.toss.velocity, _velocities(flight, rates, flights.log.header)) for flight, _, rates in spun]
+
+
+def ratios_of_rates(flights: Flights) -> Iterator[tuple[str, float, float, float]]:
+    """Names of recorded rates, and their ratio to those of the motion with its interval, which needs `FEWEST` flights."""
+    for name, columns in zip(("spin over that of the orientations", "velocity over that of the positions"), _rated(flights), strict=True):
+        known = [(given[flight.rows], exact) for flight, given, exact in columns if given is not None and exact.any()]
+        if known:
+            ratios = np.array([[np.sum(given * exact) / np.sum(exact**2)] for given, exact in known])
+            (low,), (high,) = intervals_of_means(ratios)
+            yield name, float(ratios.mean()), float(low), float(high)
 
 
 def _velocities(flight: Flight, spins: Array, header: Header) -> Array:
@@ -50,7 +68,7 @@ def _velocities(flight: Flight, spins: Array, header: Header) -> Array:
 
 def _of_column(
     kind: str,
-    columns: Sequence[tuple[Flight, Array | None, Array]],
+    columns: _Rated,
     white: float,
     frame: Cause,
     upright: Array,

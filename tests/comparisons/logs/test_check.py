@@ -14,7 +14,7 @@ from dropspin.comparisons.logs.flights import Flights, flights_of
 from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.log import Finding, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression
-from dropspin.comparisons.logs.recording_faults import of_frames, of_rates
+from dropspin.comparisons.logs.recording_faults import of_frames, of_rates, ratios_of_rates
 from dropspin.reports.stories.log_findings import corrections, sentence
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
@@ -392,10 +392,15 @@ def test_another_reading_is_not_searched_for_others(monkeypatch: pytest.MonkeyPa
 
 def rates_of(flights: Flights, **changes: Callable[[Toss], Any]) -> Iterator[Finding]:
     """The findings of rates in flights of tosses of which other parts are changed."""
+    return of_rates(with_other_parts(flights, **changes))
+
+
+def with_other_parts(flights: Flights, **changes: Callable[[Toss], Any]) -> Flights:
+    """The same flights, of tosses of which other parts are changed."""
     log = changed(flights.log, **changes)
     each = zip(flights.rotations, log.tosses, strict=True)
     moved = [replace(rotor, flight=replace(rotor.flight, toss=toss)) for rotor, toss in each]
-    return of_rates(replace(flights, log=log, rotations=tuple(moved)))
+    return replace(flights, log=log, rotations=tuple(moved))
 
 
 @pytest.mark.parametrize("up", ["y", "z", "-x"])
@@ -427,6 +432,18 @@ def test_orientations_of_a_body_that_turns_too_fast_for_the_frames_are_no_other_
     random = np.random.default_rng(6)
     log = changed(with_rates(sound(count=4)), orientation=lambda toss: turned(1.5 * random.normal(size=(len(toss), 3)), toss.orientation))
     assert [finding.kind for finding in log_check(log).findings] == ["rotation"]
+
+
+def test_ratios_of_recorded_rates_to_those_of_the_motion_are_values() -> None:
+    """Differences give the velocity of a parabola exactly, except in its first row."""
+    flights = flights_of(with_rates(made(3, 6, spin=8.0, durations=(0.3, 0.4)).log), np.array([0.0, -9.81, 0.0]))
+    assert flights is not None
+    changes = {"velocity": lambda toss: 1.06 * toss.velocity, "angular_velocity": lambda toss: 0.95 * toss.angular_velocity}
+    (_, spin, _, _), (_, velocity, low, high) = ratios_of_rates(with_other_parts(flights, **changes))
+    assert spin == pytest.approx(0.95, rel=1e-6)
+    assert velocity == pytest.approx(1.06, rel=0.01)
+    assert low <= velocity <= high < low + 0.01
+    assert list(rates_of(flights, **changes)) == []
 
 
 @pytest.mark.sample(1)

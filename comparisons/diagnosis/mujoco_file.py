@@ -225,8 +225,9 @@ class MuJoCoFile:
         planes = [geom for geom in still if self.model.geom_type[geom] == PLANE]
         if not planes or (self.has_contacts and any(self._collide(own, geom) for geom in still)):
             return ""
-        bodies = {mujoco.mj_id2name(self.model, BODY, self.model.geom_bodyid[geom]) for geom in own}
-        excluded = [f"{one.words} leaves out their contacts" for one in self.source.every("exclude") if bodies & {*one.attributes.values()}]
+        bodies, below = ({mujoco.mj_id2name(self.model, BODY, self.model.geom_bodyid[geom]) for geom in some} for some in (own, planes))
+        pairs = [(one, {one.attributes.get("body1"), one.attributes.get("body2")}) for one in self.source.every("exclude")]
+        excluded = [f"{one.words} leaves out their contacts" for one, pair in pairs if pair & bodies and pair & below]
         why = "contacts are disabled" if not self.has_contacts else [*excluded, "no geometry of the body collides with it"][0]
         discards = option_setting(self.source, "compiler", "discardvisual", "false")
         without = "the body has no geometry" + f", by {discards}" * ('"true"' in discards.text)

@@ -254,15 +254,17 @@ BARE = f'<inertial pos="0 0 0" mass="1" diaginertia="{numbers(MOMENTS)}"/>'
     ("geom", "option", "why"),
     [
         (HIDDEN, "", "no geometry of the body collides with it"),
+        (HIDDEN, EXCLUDED.replace('"world"', '"c"'), "no geometry of the body collides with it"),
         (BARE, "", "the body has no geometry"),
         (BOX, '<option><flag contact="disable"/></option>', "contacts are disabled"),
         (BOX, EXCLUDED, f"{EXCLUDED.removeprefix('<contact>').split('/')[0]}> (model.xml, line 1) leaves out their contacts"),
         (BARE + HIDDEN, '<compiler discardvisual="true"/>', 'the body has no geometry, by discardvisual="true" (model.xml, line 1)'),
     ],
-    ids=["bits", "bare", "disabled", "excluded", "discarded"],
+    ids=["bits", "excluded from another", "bare", "disabled", "excluded", "discarded"],
 )
 def test_body_that_falls_through_the_floor(tmp_path, geom, option, why):
-    body = body_of(tmp_path, FREE.format(geom), head=option)
+    other = '<body name="c" pos="3 0 1"><freejoint/><geom size=".1"/></body>'
+    body = body_of(tmp_path, FREE.format(geom) + other, head=option, name="b")
     [(answer, found)] = findings_of(body, rest)
     assert (answer.quantity, answer.detail, found.detail) == ("support", "none", f"floor does not hold it, because {why}")
     assert body_of(tmp_path, FREE.format(BOX)).missed == ""

@@ -74,16 +74,17 @@ def _error_chart(quantity: str, errors: Sequence[Error]) -> Chart:
     """The mean error of each engine over the motion."""
     scale, unit = OF[quantity]
     shown = [error for error in errors if (error.quantity, error.at) == (quantity, "mean")]
-    rows = {error.engine: [scale * size for size in (error.value, error.lower, error.upper, error.noise_floor)] for error in shown}
-    return interval_rows(f"error of {quantity}{unit}", rows, "noise floor")
+    rows = [[scale * size for size in (error.value, error.lower, error.upper, error.noise_floor)] for error in shown]
+    return interval_rows(f"error of {quantity}{unit}", [error.engine for error in shown], rows, "noise floor")
 
 
 def _pair_chart(quantity: str, pairs: Sequence[Pair]) -> Chart:
     """The differences between engines."""
     scale, unit = OF[quantity]
-    shown = {f"{in_sentence(pair.first)} − {in_sentence(pair.second)}": pair for pair in pairs if pair.quantity == quantity}
-    rows = {names: [*(scale * size for size in (pair.difference, pair.lower, pair.upper)), 0.0] for names, pair in shown.items()}
-    return interval_rows(f"difference of {quantity}{unit}", rows, "no difference")
+    shown = [pair for pair in pairs if pair.quantity == quantity]
+    names = [f"{in_sentence(pair.first)} − {in_sentence(pair.second)}" for pair in shown]
+    rows = [[*(scale * size for size in (pair.difference, pair.lower, pair.upper)), 0.0] for pair in shown]
+    return interval_rows(f"difference of {quantity}{unit}", names, rows, "no difference")
 
 
 def _error_rows(errors: Sequence[Error]) -> Rows:

@@ -72,7 +72,7 @@ class FittedLog(Study):
             if not row.has_lower and not row.has_upper
         ]
         charts = [
-            interval_rows(parameter, {row.engine: (row.value, row.lower, row.upper) for row in alike})
+            interval_rows(parameter, [row.engine for row in alike], [(row.value, row.lower, row.upper) for row in alike])
             for parameter, alike in grouped(fit.estimates, lambda estimate: estimate.parameter).items()
         ]
         sentences = [legend, *unknown, *map(transfer, fit.transfers), *left_out(fit.left_out)]

@@ -1,5 +1,6 @@
 """Failure modes of engines along an axis."""
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,15 +62,14 @@ def plot_failure_modes(found: RobustnessStudy, axis_name: str, axes: "Axes") -> 
     draw(failure_modes(found, axis_name), axes)
 
 
-def _bars(scan: AxisScan, row: int) -> list[Line]:
+def _bars(scan: AxisScan, row: int) -> Iterator[Line]:
     """A bar for each failure mode between two transitions."""
     place = scan.axis.coordinate
-    left, bars = place(scan.points[0].value), []
+    left = place(scan.points[0].value)
     for inside, outside in [*scan.transitions, (scan.points[-1], scan.points[-1])]:
         right = 0.5 * (place(inside.value) + place(outside.value))
-        bars.append(Line(_in_words(inside.mode), np.array([left, right]), np.full(2, float(row)), COLOURS[inside.mode], BAR))
+        yield Line(_in_words(inside.mode), np.array([left, right]), np.full(2, float(row)), COLOURS[inside.mode], BAR)
         left = right
-    return bars
 
 
 def _in_words(mode: str) -> str:

@@ -31,7 +31,7 @@ def document(checked: Checked, failures: Sequence[Failure], run: str, baseline: 
         run: The folder of the run, as it appears in printed commands.
         baseline: The file of the baseline; None without one.
     """
-    results, listed = checked.results, failure_parts(checked.results, failures, baseline)
+    results, listed = checked.results, list(failure_parts(checked.results, failures, baseline))
     *notes, verdict = sentences(checked, run, baseline)
     tallies = Table([_tally(results, engine) for engine in results.engines], on_terminal=False)
     versions = ", ".join(f"{name} {version}" for name, version in versions_behind(results.provenance).items())

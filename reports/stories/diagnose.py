@@ -1,7 +1,7 @@
 """The output of `dropspin diagnose`: the measured and exact values of one body, or a table of several bodies; then the findings."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from itertools import groupby
 from typing import Literal
@@ -91,7 +91,7 @@ def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
         *broken,
         Heading(f"{body.name} in {body.engine}"),
         Paragraph(head, on_terminal=on_terminal),
-        Table(answer_rows(body), on_terminal=on_terminal),
+        Table(list(answer_rows(body)), on_terminal=on_terminal),
         Sentences([*sentences(body), *_left_out(body)], numbered=True, on_terminal=on_terminal),
         *([Charts(f"{body.name} {body.engine}", drawn)] if drawn else []),
     ]
@@ -130,19 +130,17 @@ def _overview(body: BodyDiagnosis) -> dict[str, str]:
     }
 
 
-def answer_rows(body: BodyDiagnosis) -> Rows:
+def answer_rows(body: BodyDiagnosis) -> Iterator[dict[str, str]]:
     """A row for each measured value. Equal values for several axes or speeds share a row, as do the moments of inertia."""
-    rows = []
     moments = [answer for answer in body.answers if answer.quantity == MOMENT]
     ratios = [formatted(answer.measured / answer.physical) for answer in moments]
     if moments:
-        rows.append(_row(body, "inertia", "moments / solid's", ", ".join(dict.fromkeys(ratios)), "", "1", ""))
+        yield _row(body, "inertia", "moments / solid's", ", ".join(dict.fromkeys(ratios)), "", "1", "")
     shown = [answer for answer in body.answers if answer not in moments and answer.question not in ("file", "friction")]
     for _, group in groupby(shown, lambda answer: (answer.question, answer.quantity, _cells(answer))):
         same = list(group)
         kinds = ", ".join(dict.fromkeys(map(_kind, same[0].findings)))
-        rows.append(_row(body, same[0].question, _together(same), *_cells(same[0]), kinds))
-    return rows
+        yield _row(body, same[0].question, _together(same), *_cells(same[0]), kinds)
 
 
 def _row(body: BodyDiagnosis, question: str, quantity: str, measured: str, in_force: str, physical: str, cause: str) -> dict[str, str]:
@@ -173,9 +171,8 @@ def _value(value: float, unit: str) -> str:
     return with_unit(f"{value:.4g}" if abs(value) >= 1e-3 else formatted(value), unit)
 
 
-def sentences(body: BodyDiagnosis) -> list[str]:
+def sentences(body: BodyDiagnosis) -> Iterator[str]:
     """A sentence for each finding: what is wrong, the settings that cause it, quoted from the file with their lines, and the remedies."""
-    lines = []
     for same in grouped(body.findings, _shared).values():
         question, finding = same[0][0].question, same[0][1]
         stated = grouped(same, _statement).items()
@@ -184,8 +181,7 @@ def sentences(body: BodyDiagnosis) -> list[str]:
         if finding.tried:
             where = f"not removed by a change of {' or '.join(_settings(body, finding.tried))}"
         sentence = f"{question.capitalize()}, {_kind(finding)}: {statements}" + (f": {where}." if where else ".")
-        lines.append(" ".join([sentence, *_remedies(*same)]))
-    return lines
+        yield " ".join([sentence, *_remedies(*same)])
 
 
 def _shared(pair: tuple[Answer, Finding]) -> tuple[object, ...]:
@@ -206,9 +202,8 @@ def _together(answers: Sequence[Answer]) -> str:
     return ", ".join(quantities)
 
 
-def _remedies(*same: tuple[Answer, Finding]) -> list[str]:
+def _remedies(*same: tuple[Answer, Finding]) -> Iterator[str]:
     """A sentence for each remedy that the findings share, with the values measured with this remedy."""
-    lines = []
     for remedies in zip(*(finding.remedies for _, finding in same), strict=True):
         pairs = zip(remedies, (answer for answer, _ in same), strict=True)
         values = {_value_after(remedy, answer): None for remedy, answer in pairs}
@@ -217,8 +212,7 @@ def _remedies(*same: tuple[Answer, Finding]) -> list[str]:
         if first.others or not first.runs:
             also = f"it also applies to {counted(first.others, 'other body', 'other bodies')}, and " if first.others else ""
             text += f" ({also}the whole model {'runs' if first.runs else 'breaks down'} with it)"
-        lines.append(f"{text}.")
-    return lines
+        yield f"{text}."
 
 
 def _value_after(remedy: Remedy, answer: Answer) -> str:

@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from operator import attrgetter, itemgetter
 from typing import NamedTuple
 
@@ -90,7 +90,7 @@ def _failure(results: Results, group: Sequence[Row], baseline: str | None) -> Fa
     )
 
 
-def failure_parts(results: Results, failures: Sequence[Failure], baseline: str | None = None) -> list[Part]:
+def failure_parts(results: Results, failures: Sequence[Failure], baseline: str | None = None) -> Iterator[Part]:
     """For each engine: what explains its asymptotic errors, a sentence for each cause of failures, and one command that reproduces them.
 
     Failures of an engine in one scene are assumed to have one cause, and so are breakdowns with the same message in several scenes.
@@ -98,20 +98,18 @@ def failure_parts(results: Results, failures: Sequence[Failure], baseline: str |
     broken = {(failure.scene, failure.engine) for failure in failures if failure.broke_down}
     # Accepted results of an engine that broke down are gone because it broke down.
     shown = [failure for failure in failures if failure.result or not failure.accepted or (failure.scene, failure.engine) not in broken]
-    parts: list[Part] = []
     for engine, of_engine in grouped(shown, attrgetter("engine")).items():
         by_cause = grouped(of_engine, lambda failure: (failure.broke_down, failure.what if failure.broke_down else failure.scene))
-        explained = _consistent_with(results, engine) + settings_that_explain(results, engine)
+        explained = [*_consistent_with(results, engine), *settings_that_explain(results, engine)]
         sentences = [f"✗ {_of_one_cause(alike)}" for alike in by_cause.values()]
         for most, on_page in ((MOST_ON_PAGE, True), (MOST_ON_TERMINAL, False)):
             more = len(sentences) - most
             others = [f"✗ {engine} has {counted(more, 'more failure')}."] if more > 0 else []
-            parts.append(Sentences([*explained, *sentences[:most], *others], style="red", on_page=on_page, on_terminal=not on_page))
+            yield Sentences([*explained, *sentences[:most], *others], style="red", on_page=on_page, on_terminal=not on_page)
         scenes = list(dict.fromkeys(failure.scene for alike in by_cause.values() for failure in alike))
         of_baseline = baseline if any(failure.accepted for failure in of_engine) else None
         checks = _checks(of_baseline, symmetries=any(failure.of_symmetry for failure in of_engine))
-        parts.append(Paragraph("Reproduce:", reproduce_scenes(results, scenes, engine, more=checks)))
-    return parts
+        yield Paragraph("Reproduce:", reproduce_scenes(results, scenes, engine, more=checks))
 
 
 def _consistent_with(results: Results, engine: str) -> list[str]:
@@ -122,17 +120,15 @@ def _consistent_with(results: Results, engine: str) -> list[str]:
     return [f"Possible cause of the asymptotic errors of {engine}: {listed}."] if listed else []
 
 
-def settings_that_explain(results: Results, engine: str) -> list[str]:
+def settings_that_explain(results: Results, engine: str) -> Iterator[str]:
     """A sentence for each error that changed settings of an engine explain; scenes with the same settings share a sentence."""
     mine = results.table[(results.table["kind"] == "setting") & (results.table["engine"] == engine)].to_dict("records")
     by_scene = grouped(mine, itemgetter("scene", "metric", "dt"))
     alike = grouped(by_scene.items(), lambda item: (item[0][1], *(row["truth"] for row in item[1])))
-    sentences = []
     for ((scene, metric, dt), rows), *others in alike.values():
         also = f"; the same settings explain it in {listed([where for (where, *_), _ in others])}" if others else ""
         error = f"of the {subject(metric, 'truth', '')} at {in_ms(dt)}"
-        sentences.append(f"{scene}: {explained_by({row['truth']: row['value'] for row in rows}, error)}{also}.")
-    return sentences
+        yield f"{scene}: {explained_by({row['truth']: row['value'] for row in rows}, error)}{also}."
 
 
 def _described(wrong: WrongParameter) -> str:

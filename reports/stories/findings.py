@@ -171,7 +171,7 @@ def missing_engines(results: Results) -> list[str]:
     return list(results.table.loc[results.table["verdict"] == "missing"].drop_duplicates("engine")["reason"])
 
 
-def finding_sentences(results: Results) -> list[str]:
+def finding_sentences(results: Results) -> Iterator[str]:
     """One sentence for each engine that is not missing.
 
     The sentence gives the number of scenes with each outcome, the largest error that fails, is expected or does not vanish as dt → 0, and
@@ -179,17 +179,14 @@ def finding_sentences(results: Results) -> list[str]:
     """
     times, statuses, lasting = step_times(results), results.statuses(), results.asymptotic_errors("model", "setting")
     lasting = lasting[lasting["value"].abs() > SMALLEST_STATED]
-    missing, sentences = set(results.table.loc[results.table["verdict"] == "missing", "engine"]), []
+    missing = set(results.table.loc[results.table["verdict"] == "missing", "engine"])
     for engine in results.engines:
         if engine in missing:
             continue
         remain = set(lasting.loc[lasting["engine"] == engine, "scene"])
-        parts = [
-            _convergence(results, engine, {scene: of[engine] for scene, of in statuses.items()}, remain),
-            *_cost(engine, times, results.provenance.get("compilation", {}).get(engine)),
-        ]
-        sentences.append(f"{in_sentence(engine)}: {'; '.join(parts)}.")
-    return sentences
+        outcomes = _convergence(results, engine, {scene: of[engine] for scene, of in statuses.items()}, remain)
+        cost = _cost(engine, times, results.provenance.get("compilation", {}).get(engine))
+        yield f"{in_sentence(engine)}: {'; '.join([outcomes, *cost])}."
 
 
 def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], remain: Collection[str]) -> str:

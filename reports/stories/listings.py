@@ -1,5 +1,7 @@
 """The output of `dropspin list`: the scenes, the engines or the metrics."""
 
+from collections.abc import Iterator
+
 from dropspin.reports.document import Rows
 from dropspin.scenarios.loading import load, names
 from dropspin.scenarios.problems import problems
@@ -23,18 +25,17 @@ def scene_rows() -> Rows:
     ]
 
 
-def engine_rows() -> Rows:
+def engine_rows() -> Iterator[dict[str, str]]:
     """The engines that can be chosen by name: whether they are installed, what they are or how to install them, and their options."""
     from dropspin.comparisons.engines.registry import absence, engine_names
     from dropspin.comparisons.engines.stand_in import StandIn
     from dropspin.comparisons.running.engine_entries import engine_entry
 
-    rows = []
     for name in engine_names():
         entry = engine_entry(name)
         if entry.engine is None:
             installed = "no" if entry.absence == "missing" else entry.absence
-            rows.append({"engine": name, "installed": installed, "summary": absence(name) or entry.reason, "options": ""})
+            yield {"engine": name, "installed": installed, "summary": absence(name) or entry.reason, "options": ""}
             continue
         adapter = entry.adapter
         choices = [f"{key} = {' | '.join(values)}" for key, values in adapter.choices.items()]
@@ -42,8 +43,7 @@ def engine_rows() -> Rows:
         settings = [f"{len(adapter.settings)} settings: dropspin show {name}"] if adapter.settings else []
         options = "; ".join(choices + numbers + settings)
         summary = adapter.traits.summary if isinstance(adapter, StandIn) else (type(adapter).__doc__ or "").strip().partition("\n")[0]
-        rows.append({"engine": name, "installed": "yes", "summary": summary, "options": options})
-    return rows
+        yield {"engine": name, "installed": "yes", "summary": summary, "options": options}
 
 
 def metric_rows() -> Rows:

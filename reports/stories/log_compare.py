@@ -1,13 +1,13 @@
 """The output of `dropspin log compare`: errors of engines relative to measured tosses, differences between engines, parts of errors."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Literal
 
 from dropspin.comparisons.logs.compare import Error, LogComparison, Pair, Share
 from dropspin.comparisons.logs.log import Finding
-from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Rows, Sentences, Table
+from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.colours import in_sentence
 from dropspin.reports.plots.intervals import interval_rows
@@ -51,7 +51,7 @@ class ComparedLog(Study):
         study, parts = self.comparison, list[Part]()
         if study.errors:
             parts += [
-                Table(_error_rows(study.errors), left_out_first=["at impact", "0.1 s later"]),
+                Table(list(_error_rows(study.errors)), left_out_first=["at impact", "0.1 s later"]),
                 Paragraph(LEGEND.format(tosses=study.tosses, length=1e3 * study.length)),
                 Charts("errors", [_error_chart(quantity, study.errors) for quantity in OF]),
             ]
@@ -64,7 +64,7 @@ class ComparedLog(Study):
         parts.append(Sentences([*_group_sentences(study), *left_out(study.left_out)]))
         if study.parts:
             heading = Heading("Parts of the mean errors over the motion", on_terminal=True)
-            parts += [heading, Table(_part_rows(study)), Paragraph(IMPROVED)]
+            parts += [heading, Table(list(_part_rows(study))), Paragraph(IMPROVED)]
         return Document(
             f"Engines compared with {self.recording}", parts, [Sentences(corrections(self.recording, self.findings), style="bold")]
         )
@@ -87,13 +87,11 @@ def _pair_chart(quantity: str, pairs: Sequence[Pair]) -> Chart:
     return interval_rows(f"difference of {quantity}{unit}", names, rows, "no difference")
 
 
-def _error_rows(errors: Sequence[Error]) -> Rows:
-    rows = []
+def _error_rows(errors: Sequence[Error]) -> Iterator[dict[str, str]]:
     for (engine, quantity), kinds in grouped(errors, lambda error: (error.engine, error.quantity)).items():
         scale, unit = UNITS[kinds[0].unit]
         cells = {kind.at: f"{_interval(scale, kind.value, kind)} ({formatted(scale * kind.noise_floor)})" for kind in kinds}
-        rows.append({"engine": engine, "error": quantity + unit} | {name: cells.get(at, "") for at, name in AT.items()})
-    return rows
+        yield {"engine": engine, "error": quantity + unit} | {name: cells.get(at, "") for at, name in AT.items()}
 
 
 def _interval(scale: float, value: float, of: Error | Pair | Share) -> str:
@@ -123,10 +121,8 @@ def _group_sentences(study: LogComparison) -> list[str]:
     return [*sentences, meaning] if study.pairs else []
 
 
-def _part_rows(study: LogComparison) -> Rows:
-    rows = []
+def _part_rows(study: LogComparison) -> Iterator[dict[str, str]]:
     for (engine, quantity), parts in grouped(study.parts, lambda part: (part.engine, part.quantity)).items():
         scale, unit = OF[quantity]
         cells = {part.part: _interval(scale, part.value, part) for part in parts}
-        rows.append({"engine": engine, "error": quantity + unit, **cells})
-    return rows
+        yield {"engine": engine, "error": quantity + unit, **cells}

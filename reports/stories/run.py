@@ -67,7 +67,7 @@ def overview(results: Results) -> Overview:
     return Overview(
         verdict=verdict_sentence(results, counts(results)),
         points=[*map(Point, before), *conclusion(results), *map(Point, after)],
-        findings=finding_sentences(results),
+        findings=list(finding_sentences(results)),
         statuses=results.statuses(),
         leading=leading_errors(results),
         profiles=profiles,

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dropspin.comparisons.judging.verdicts import COMBINED, MARKS
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.results.results import Results
-from dropspin.reports.document import Heading, Part, Rows, Sentences, Table
+from dropspin.reports.document import Heading, Part, Sentences, Table
 from dropspin.reports.stories.findings import orders
 from dropspin.reports.stories.impact_laws import law_rows
 from dropspin.reports.stories.numbers import formatted, in_ms, outcome, trend, unit, with_unit
@@ -18,7 +18,7 @@ def scene_parts(results: Results) -> list[Part]:
         remarks = of_scene.table[of_scene.table["metric"] == ""].drop_duplicates(["engine", "verdict", "reason"]).to_dict("records")
         parts += [
             Heading(": ".join(filter(None, [name, results.scenes[name].summary])), on_terminal=True),
-            Table(_rows(of_scene), ["spread", *reversed(results.engines)]),
+            Table(list(_rows(of_scene)), ["spread", *reversed(results.engines)]),
             Sentences([*_trends(of_scene, name), *_uncertainties(of_scene), *_ensemble(of_scene, name)], style="dim"),
             Table(law_rows(of_scene)),
             Sentences([f"{row['engine']}: {outcome(row['verdict'])}. {row['reason']}" for row in remarks]),
@@ -26,19 +26,17 @@ def scene_parts(results: Results) -> list[Part]:
     return parts
 
 
-def _rows(results: Results) -> Rows:
+def _rows(results: Results) -> Iterator[dict[str, str]]:
     """The metrics of a scene at the finest time step, and the largest difference between independent engines."""
     frame, pairs, dt = results.table, results.agreements, results.table["dt"].min()
     own = frame[(frame["dt"] == dt) & frame["kind"].isin(["truth", "invariant"])]
     independent = pairs[(pairs["dt"] == dt) & (pairs["basis"] != "same_method")]
     spreads = independent["value"].abs().groupby(independent["metric"]).max().dropna().map(formatted)
     cells = {(row["metric"], row["engine"]): f"{formatted(row['value'])} {MARKS[row['verdict']]}" for row in own.to_dict("records")}
-    rows = []
     for metric, of in own.drop_duplicates("metric")[["metric", "unit"]].itertuples(index=False):
         row = {f"at dt = {in_ms(dt)}": metric.replace("_", " ") + unit(of)}
         row |= {engine: cells.get((metric, engine), "–") for engine in results.engines}
-        rows.append(row | ({"spread": spreads.get(metric, "")} if len(independent) else {}))
-    return rows
+        yield row | ({"spread": spreads.get(metric, "")} if len(independent) else {})
 
 
 def _trends(results: Results, name: str) -> Iterator[str]:

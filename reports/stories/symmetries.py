@@ -1,7 +1,7 @@
 """The output of `dropspin symmetries`: the worst finding for each engine and symmetry, and a sentence on each symmetry that is lost."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from operator import attrgetter, itemgetter
 from typing import Literal
 
@@ -94,13 +94,11 @@ def _broken(findings: Sequence[Finding]) -> str:
     return f"{worst.engine}, {worst.symmetry}: in {worst.scene}, the two motions differ {since}; the largest difference is {size}{more}."
 
 
-def _not_run(findings: Sequence[Finding]) -> list[str]:
+def _not_run(findings: Sequence[Finding]) -> Iterator[str]:
     """Sentences on the engines, symmetries and scenes that were not run, by reason."""
     groups = grouped((finding for finding in findings if finding.status == "not run"), attrgetter("engine", "reason"))
-    sentences = []
     for (engine, reason), group in sorted(groups.items(), key=itemgetter(0)):
         scenes, names = (dict.fromkeys(getattr(finding, name) for finding in group) for name in ("scene", "symmetry"))
         ways = f" ({', '.join(names)})" if len(names) < len(NAMES) // 2 else ""
         options = " (options --time-limit and --dt)" if group[0].verdict == "timed_out" else ""
-        sentences.append(f"Not run: {engine} in {', '.join(scenes)}{ways}: {reason.removesuffix('.')}{options}.")
-    return sentences
+        yield f"Not run: {engine} in {', '.join(scenes)}{ways}: {reason.removesuffix('.')}{options}."

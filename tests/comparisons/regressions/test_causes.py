@@ -51,7 +51,7 @@ def _few_starts(request):
 
 def consistent_with(engine, *scenes, steps=STEPS):
     results = run([lasting(name) for name in scenes], engine, steps)
-    sentence = failure_parts(results, failures(results))[0].items[0]
+    sentence = next(failure_parts(results, failures(results))).items[0]
     return sentence.replace(f" of {results.engines[0]}: ", ": ", 1) if sentence.startswith("Possible cause") else ""
 
 

@@ -67,6 +67,7 @@ class LooseBody(ABC):
         inertia: About the centre of mass, in the body frame [kg m²], shape (3, 3).
         offset: The centre of mass in the frame that damping and armature act on [m], shape (3,).
         parts: The geometries, visual ones included.
+        is_bounded: Whether everything with mass has geometries, inside of which the mass is.
         pose: The orientation of the body in the file, shape (4,).
         resistance: The damping, a function of velocity and spin.
         falls: The damping of a fall.
@@ -101,6 +102,7 @@ class LooseBody(ABC):
     inertia: Array
     offset: Array
     parts: Sequence[Part]
+    is_bounded: bool
     pose: Array
     resistance: Resistance
     falls: Drag

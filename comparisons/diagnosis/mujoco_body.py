@@ -98,6 +98,7 @@ class MuJoCoBody(LooseBody):
         self.mass, self.offset, self.inertia = found
         self.pose = multiply(alone.level, np.roll(file.data.xquat[alone.head], -1))
         self.parts = list(self._parts())
+        self.is_bounded = set(np.flatnonzero(self._model.body_mass)) <= {*self._model.geom_bodyid}
         self.falls, self.resistance, self.armature = Drag(*alone.damping), joint_damping(*alone.damping), alone.armature
         self.spins = [self.falls] * 3
         # The share of the weight that `gravcomp` of the body and of what is welded to it takes away.

@@ -20,6 +20,7 @@ from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
 
 OF_MODEL = ("cone", "impratio", "density", "viscosity", "wind", "iterations", "ls_iterations", "tolerance")
+TURNS = ("quat", "axisangle", "xyaxes", "zaxis", "euler", "rpy")
 OF_JOINT = ("damping", "armature", "frictionloss")
 SAME = 1e-6
 """Relative difference up to which a moment of inertia is the one that was written."""
@@ -105,6 +106,7 @@ class BodyText:
             names = ("diaginertia", "fullinertia", "mass")
             written["mass"] = [inertial.setting("mass") or next((one.words for one in inertial.every("mass")), None)]
             written["centre"] = [inertial.setting("pos") or next((one.words for one in inertial.every("origin")), inertial.words)]
+            written["turn"] = [one.setting(name) for one in (inertial, *inertial.every("origin")) for name in TURNS]
             written["inertia"] = [inertial.setting(name) for name in names] if tensor is None else [tensor.words]
         # Of several places, the first one counts.
         return found | {name: one for name, several in written.items() for one in reversed(several) if one} | of_all

@@ -189,6 +189,7 @@ class PyBulletBody(LooseBody):
         is_hard = all(link.dynamics[9] < 0.0 for link in touching)  # a spring and damper have no restitution
         is_held = any(part.collides for part in parts)
         self.parts, self.surface = parts, SURFACE if is_held else ""
+        self.is_bounded = all(link.geometry or [*link.element.every("visual")] for link in self._links if link.mass)
         self.missed = f"{SURFACE}: its collision group and mask exclude static bodies" if parts and not is_held else ""
         self.friction = touching[0].dynamics[1] * plane[1] if len(frictions) == 1 else math.nan
         self.restitution = touching[0].restitution * plane[5] if is_hard and len(restitutions) == 1 else None
@@ -224,7 +225,10 @@ class PyBulletBody(LooseBody):
         owned = [(link if name in ("inertia", "mass") else touching.element, tag, at, name) for tag, at, name in WRITTEN]
         written = {name: found for owner, tag, at, name in owned for one in owner.every(tag) if (found := one.setting(at))}
         for inertial in link.every("inertial"):
-            written["centre"] = next((one.words for one in inertial.every("origin")), inertial.words)
+            origin = next(inertial.every("origin"), inertial)
+            written["centre"] = origin.words
+            if (turn := origin.setting("rpy")) is not None:
+                written["turn"] = turn
         return {name: Setting(text) for name, text in DEFAULTS.items()} | written
 
     def _ignored(self, restitution: float) -> Sequence[Ignored]:

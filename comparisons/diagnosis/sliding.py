@@ -9,7 +9,7 @@ import numpy as np
 from dropspin.comparisons.diagnosis.answers import KEPT, MOVES, TIPS, UNTURNED, WATCHED, Answer, judged
 from dropspin.comparisons.diagnosis.landing import is_at_rest, tilt
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
-from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
+from dropspin.scenarios.rotations import about, conjugate, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.damped_joint import spin_about_axis
 
@@ -25,6 +25,8 @@ MARGINAL = 1.01
 """Ratio of the two levers up to which a body, such as a cube with a coefficient of friction of 1, is not said to tip."""
 LEANING = np.array([0.0, 0.01, 0.0101])
 """Angles by which the lever of the weight about the leading edge is found [rad]; an uneven load tilts a body at rest by less."""
+EDGES = np.radians(np.arange(-80.0, 80.1, 0.25))
+"""Directions from that of a slide to the normals of edges about which the body may turn [rad]."""
 WAYS = {"0°": np.array([1.0, 0.0, 0.0]), "45°": math.sqrt(0.5) * np.array([1.0, 0.0, 1.0])}
 """Directions of a slide, by their angle to an axis of the surface."""
 
@@ -83,11 +85,13 @@ def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direct
 
 def _is_tipped(body: LooseBody, rest: Array, direction: Array) -> bool:
     """Whether friction turns a rigid body that slides in a direction over its leading edge: at first its weight has the shorter arm."""
-    states = np.zeros((len(LEANING), 13))
-    states[:, ORIENTATION] = multiply(about(np.cross(UP, direction), LEANING), rest[ORIENTATION])
-    height, leaning, further = -body.lowest(states)  # of the centre of mass, which rises by the lever as the body leans, and falls
-    lever = (further - leaning) / (LEANING[2] - LEANING[1]) + LEANING[1] * leaning
-    return bool(body.friction * height > MARGINAL * lever)
+    yaw, leans = about(UP, EDGES)[:, np.newaxis], about(np.cross(UP, direction), LEANING)
+    states = np.zeros((len(EDGES), len(LEANING), 13))
+    states[..., ORIENTATION] = multiply(multiply(yaw, multiply(leans, conjugate(yaw))), rest[ORIENTATION])
+    heights = -body.lowest(states.reshape(-1, 13))  # of the centre of mass, which rises by the lever as the body leans, and falls
+    height, leaning, further = heights.reshape(-1, len(LEANING)).T
+    levers = (further - leaning) / (LEANING[2] - LEANING[1]) + LEANING[1] * leaning
+    return bool((body.friction * height > MARGINAL * levers / np.cos(EDGES)).any())
 
 
 def _stop(body: LooseBody) -> float:

@@ -198,6 +198,13 @@ def test_tall_box_that_friction_turns_over_its_edge_has_no_stopping_distance(tmp
         assert [answer.detail == TIPS for answer in slide(body, ladder(body))] == [tips] * 2
 
 
+def test_box_that_tips_over_its_long_edge_at_45_degrees_has_no_stopping_distance(tmp_path):
+    """The load moves by µ h = 90 mm, along the motion to (64, 64) mm, beyond the edge at 50 mm; with µ h = 60 mm to (42, 42) mm."""
+    for height, tips in ((0.09, True), (0.06, False)):
+        body = body_of(tmp_path, FREE.format(f'<geom type="box" size=".1 .05 {height}" mass="2"/>'), 'cone="elliptic"')
+        assert [answer.detail == TIPS for answer in slide(body, ladder(body))] == [tips] * 2
+
+
 def test_body_that_an_uneven_load_tilts_at_rest_slides(tmp_path):
     """By 0.5 mrad on a soft surface, backwards; µ times its height is 25 mm, the lever about its leading edge 250 mm."""
     block = '<inertial pos="-.1 0 .005" mass="1" diaginertia=".01 .01 .01"/><geom type="box" size=".15 .1 .02"/>'

@@ -461,6 +461,22 @@ def test_mesh_of_several_objects_without_mass_is_not_named(tmp_path, mass):
     assert body.ignored == []
 
 
+def test_part_with_mass_and_without_geometry_does_not_bound_the_inertia(tmp_path):
+    """A load of 3 kg on a stalk above a box: the box does not contain the mass."""
+    load = '<body pos=".08 0 .2"><inertial pos="0 0 0" mass="3" diaginertia=".003 .003 .003"/></body>'
+    assert impossible(body_of(tmp_path, FREE.format(f'<geom type="box" size=".1 .05 .03" mass="2"/>{load}'))) == []
+
+
+def test_frame_of_an_inertia_that_is_turned_by_mistake_is_named(tmp_path):
+    """By 90 rad in place of 90°, of the moments of a solid box of 2 kg."""
+    moments = 2.0 / 3.0 * np.array([0.05**2 + 0.03**2, 0.1**2 + 0.03**2, 0.1**2 + 0.05**2])
+    inertial = f'<inertial pos="0 0 0" euler="0 90 0" mass="2" diaginertia="{numbers(moments)}"/><geom type="box" size=".1 .05 .03"/>'
+    [answer] = impossible(body_of(tmp_path, FREE.format(inertial), head='<compiler angle="radian"/>'))
+    [found] = answer.findings
+    assert found.settings == ("turn",)
+    assert found.remedies[0].text.startswith("a frame that is not turned, with ixx, iyy, izz = 0.00227, 0.00727, 0.00833 kg m²")
+
+
 @pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass' is deprecated")
 def test_inertia_of_a_solid_is_that_of_the_mass_in_the_file(tmp_path):
     """`settotalmass` multiplies both: the inertia for the mass in force would be as impossible."""

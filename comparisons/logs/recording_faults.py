@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, SURPRISING, Flight, departures, noise_of, surprise, window_size
-from dropspin.comparisons.logs.flights import Flights, highest
+from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, heights, highest
 from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.intervals import intervals_of_means
 from dropspin.comparisons.logs.log import Cause, Finding
@@ -139,7 +139,7 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
         times_are_right = _residual(flights, equal_steps=False) <= BETTER * _residual(flights, equal_steps=True)
         irregularities = tuple(finding for finding in irregularities if finding.kind != "jitter" or not times_are_right)
     yield from irregularities
-    noise, flown = noise_of(flights.log), {flight.toss.name for flight in flights.found}
+    noise, mid_air, flown = noise_of(flights.log), _in_mid_air(flights), {flight.toss.name for flight in flights.found}
     for toss in flights.log.tosses:
         if toss.name not in flown:
             yield Finding("no flight", 0.0, window_size(toss, noise, flights.moving.values[ACCELERATION]), toss.name)
@@ -151,6 +151,9 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
             if missing or bad:
                 frame = flight.end + 1 if part is flight else flight.first - 1 - bad
                 yield Finding("frame dropped" if missing else "bad frame", missing or bad, 0.0, flight.toss.name, frame)
+            elif part is flight and flight.toss.name in mid_air:
+                causes = (Cause("frames missing"), Cause("touched"))
+                yield Finding("mid-air", mid_air[flight.toss.name], 0.0, flight.toss.name, flight.end - 1, causes)
             elif part is not flight and flight.first > 2:
                 yield Finding("late", flight.first, 0.0, flight.toss.name, flight.first, (Cause("held"), Cause("earlier impact")))
 
@@ -172,13 +175,34 @@ def _likely_missing(flight: Flight, shared: Array) -> Iterator[int]:
 
     Beyond so many frames, a flight predicts little.
     """
-    toss, samples, next_ones = flight.toss, departures(flight, shared), np.arange(flight.end + 1, flight.end + 4)
+    toss, next_ones = flight.toss, np.arange(flight.end + 1, flight.end + 4)
     if next_ones[-1] < len(toss):
         numbers = np.arange(1, len(flight) + 1)
-        t = (toss.t[next_ones] - toss.t[flight.first] + numbers[:, np.newaxis] * toss.time_step)[..., np.newaxis]
-        start, velocity = np.polynomial.polynomial.polyfit(samples.t, samples.values, 1)
-        motion = start + velocity * t + shared[ACCELERATION] * t**2 / 2.0 + rotate(toss.orientation[next_ones], shared[OFFSET])
-        yield int(numbers[np.argmin(np.sum((toss.position[next_ones] - motion) ** 2, axis=(1, 2)))])
+        t = toss.t[next_ones] - toss.t[flight.first] + numbers[:, np.newaxis] * toss.time_step
+        left = toss.position[next_ones] - _continued(flight, shared, t, toss.orientation[next_ones])
+        yield int(numbers[np.argmin(np.sum(left**2, axis=(1, 2)))])
+
+
+def _continued(flight: Flight, shared: Array, t: Array, orientation: Array) -> Array:
+    """The tracked point at times from the first frame of a flight on [s], with orientations then: straight on, and as bodies fall."""
+    samples, t = departures(flight, shared), t[..., np.newaxis]
+    start, velocity = np.polynomial.polynomial.polyfit(samples.t, samples.values, 1)
+    return np.asarray(start + velocity * t + shared[ACCELERATION] * t**2 / 2.0 + rotate(orientation, shared[OFFSET]))
+
+
+def _in_mid_air(flights: Flights) -> dict[str, float]:
+    """How high the flights end that would not be near the floor three frames after their last one [m], by the name of the toss.
+
+    None if these are more than half of the flights: the floor is elsewhere then.
+    """
+    header, found = flights.log.header, {}
+    for rotor in flights.rotations if header.floor is not None else ():
+        flight, toss = rotor.flight, rotor.flight.toss
+        t = toss.t[flight.end - 1] - toss.t[flight.first] + np.arange(4) * toss.time_step
+        above = heights(header, _continued(flight, flights.moving.values, t, rotor(t)[0]), rotor(t)[0])
+        if flight.end < len(toss) and above.min() > NEAR_FLOOR * header.body.size:
+            found[toss.name] = float(above[0])
+    return found if 2 * len(found) <= len(flights.found) else {}
 
 
 def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:

@@ -53,9 +53,9 @@ def corrections(recording: str, findings: Iterable[Finding]) -> list[str]:
         sentences.append(
             f"Correct the header first: dropspin log check {recording} writes corrected.toml, with each remedy that is the only one."
         )
-    cut = [finding for finding in findings if finding.kind in ("frame dropped", "bad frame")]
+    cut = [finding for finding in findings if finding.kind in ("frame dropped", "bad frame", "mid-air")]
     if cut:
-        sentences.append(f"Flights that are cut at missing or wrong frames, although they continue: {len(cut)}. {sentence(cut[0])}")
+        sentences.append(f"Flights that end before the body reaches the floor: {len(cut)}. {sentence(cut[0])}")
     return sentences
 
 

@@ -226,7 +226,27 @@ def test_missing_frames_are_named_with_their_place(count: int) -> None:
     shorter = replace(toss, t=toss.t[:-count], position=toss.position[kept], orientation=toss.orientation[kept])
     found = only(log_check(replace(log, tosses=(*log.tosses[:3], shorter, *log.tosses[4:]))))
     assert (found.kind, found.toss, found.value, found.frame) == ("frame dropped", "3", count, 30)
-    assert "continue: 1. Toss 3: number of frames missing before frame 30" in corrections("toss.toml", [found])[0]
+    assert "floor: 1. Toss 3: number of frames missing before frame 30" in corrections("toss.toml", [found])[0]
+
+
+def test_a_flight_that_ends_above_the_floor_is_named_unless_most_do() -> None:
+    """The body strikes the floor; of one toss all frames from 30 on until after the impact are missing, more than its flight has."""
+    recording = made(1, 5, NOISE, rate=240.0, durations=(0.3, 0.35), header={"body": CUBE, "floor": {"restitution": 0.3, "friction": 0.3}})
+    body, tosses = recording.log.header.body, []
+    for toss, exact, impact in zip(recording.log.tosses, recording.exact, recording.impacts, strict=True):
+        hit = exact(impact)
+        toss.position[:, 1] += np.abs(rotate(hit[3:7], np.diag(body.half_extents))[:, 1]).sum() - hit[1]
+        tosses.append(toss)
+    sound_one = replace(recording.log, tosses=tuple(tosses))
+    assert log_check(sound_one).findings == ()
+    kept = np.delete(np.arange(len(tosses[3])), np.arange(30, int(recording.impacts[3] * 240.0) + 2))
+    cut = replace(replace_rows(tosses[3], kept), t=tosses[3].t[: len(kept)])
+    found = only(log_check(replace(sound_one, tosses=(*tosses[:3], cut, tosses[4]))))
+    assert (found.kind, found.toss, found.frame) == ("mid-air", "3", 28)
+    assert 0.2 < found.value < 0.8
+    flights = flights_of(changed(sound_one, position=lambda toss: np.array([0.0, 1.0, 0.0]) + toss.position), np.array([0.0, -9.81, 0.0]))
+    assert flights is not None
+    assert list(of_frames(flights)) == []
 
 
 @pytest.mark.extended
@@ -467,7 +487,7 @@ def test_a_short_sound_recording_has_no_finding() -> None:
         assert log_check(replace(log, tosses=tuple(replace_rows(toss, slice(0, 12)) for toss in log.tosses))).findings == ()
 
 
-def replace_rows(toss: Toss, rows: slice) -> Toss:
+def replace_rows(toss: Toss, rows: Any) -> Toss:
     return replace(toss, t=toss.t[rows], position=toss.position[rows], orientation=toss.orientation[rows])
 
 

@@ -9,8 +9,9 @@ import numpy as np
 from dropspin.comparisons.faults.conventions import CONVENTIONS
 from dropspin.comparisons.faults.fault_model import FaultModel, Simulated, changed_table
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.bodies import Box, Ellipsoid
+from dropspin.scenarios.bodies import Box, Ellipsoid, Vertices
 from dropspin.scenarios.bodies.inertia import in_numbers, principal_axes
+from dropspin.scenarios.bodies.shape import times
 from dropspin.scenarios.model import Gravity
 from dropspin.scenarios.state import UP, Array
 from dropspin.scenarios.variations import with_values
@@ -54,6 +55,17 @@ def _as_a_ball(scene: Scenario) -> Scenario:
         return scene
     mean = float(np.trace(scene.body.inertia_tensor)) / 3.0
     return with_values(scene, "body", inertia=(mean, mean, mean))
+
+
+def _of_one_kilogram(scene: Scenario) -> Scenario:
+    masses = getattr(scene.body, "masses", None)
+    parts = {} if masses is None else {"masses": times(1.0 / scene.body.mass, masses)}
+    return with_values(scene, "body", mass=1.0, **parts)
+
+
+def _as_a_solid(scene: Scenario) -> Scenario:
+    """Points without faces have no solid."""
+    return scene if isinstance(scene.body, Vertices) else with_values(scene, "body", inertia="solid")
 
 
 def _friction(change: Callable[[float], float]) -> Simulated:
@@ -101,7 +113,7 @@ PARAMETERS: dict[str, dict[str, Simulated]] = {
         "linear damping is omitted": changed_table("damping", linear=0.0),
         "linear damping acts on the angular velocity as well": _angular_like_linear,
     },
-    "mass": {"mass is 1 kg for every scene": changed_table("body", mass=1.0)},
+    "mass": {"mass is 1 kg for every scene": _of_one_kilogram},
     "inertia": {
         "angular velocity stays constant, as without the gyroscopic term or with the inertia of a ball": _as_a_ball,
         **{
@@ -113,7 +125,7 @@ PARAMETERS: dict[str, dict[str, Simulated]] = {
         "inertia is half as large, relative to the mass": _scaled_inertia(lambda mass: 0.5),
         "inertia is multiplied by the mass": _scaled_inertia(lambda mass: mass),
         "inertia is divided by the mass": _scaled_inertia(lambda mass: 1.0 / mass),
-        "inertia is that of the solid shape for every scene": changed_table("body", inertia="solid"),
+        "inertia is that of the solid shape for every scene": _as_a_solid,
     },
     "floor": {"the body falls through the floor": lambda scene: scene.model_copy(update={"floor": None})},
     "restitution": {

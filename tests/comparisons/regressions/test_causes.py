@@ -18,7 +18,7 @@ from dropspin.reports.markdown import markdown
 from dropspin.reports.stories.check import document
 from dropspin.reports.stories.failures import failure_parts, failures
 from dropspin.reports.terminal.rows import print_document
-from dropspin.scenarios import DropspinError, load
+from dropspin.scenarios import DropspinError, Scenario, load
 from dropspin.scenarios.rotations import about, rotate
 from dropspin.scenarios.variations import with_values
 
@@ -66,6 +66,12 @@ def consistent_with(engine, *scenes, steps=STEPS):
         ("Coulomb coefficient", "exact", ["slide-box"], 0.01, SLOWER),
     ],
 )
+@pytest.mark.parametrize("number", range(1, 16))
+def test_faults_of_engines_can_be_simulated_in_random_scenes_of_every_family(number):
+    scene = load(f"draw-5-{number}")
+    assert {type(fault.simulated(scene)) for fault in mistakes.FAULT_MODELS} == {Scenario}
+
+
 def test_planted_parameter_is_named(title, engine, scenes, size, words):
     steps = STEPS if engine == "exact" else DEFAULT_DTS
     assert (

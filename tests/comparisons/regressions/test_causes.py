@@ -66,12 +66,6 @@ def consistent_with(engine, *scenes, steps=STEPS):
         ("Coulomb coefficient", "exact", ["slide-box"], 0.01, SLOWER),
     ],
 )
-@pytest.mark.parametrize("number", range(1, 16))
-def test_faults_of_engines_can_be_simulated_in_random_scenes_of_every_family(number):
-    scene = load(f"draw-5-{number}")
-    assert {type(fault.simulated(scene)) for fault in mistakes.FAULT_MODELS} == {Scenario}
-
-
 def test_planted_parameter_is_named(title, engine, scenes, size, words):
     steps = STEPS if engine == "exact" else DEFAULT_DTS
     assert (
@@ -225,3 +219,9 @@ def test_changes_of_mass_and_of_size_keep_the_products_of_inertia():
     )
     [without] = [change for words, change in of_faults.items() if words.startswith("products of inertia are omitted")]
     np.testing.assert_array_equal(without(scene).body.inertia_tensor, 0.004 * np.eye(3))
+
+
+@pytest.mark.parametrize("number", range(1, 16))
+def test_faults_of_engines_can_be_simulated_in_random_scenes_of_every_family(number):
+    scene = load(f"draw-5-{number}")
+    assert {type(fault.simulated(scene)) for fault in mistakes.FAULT_MODELS} == {Scenario}

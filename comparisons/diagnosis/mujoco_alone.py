@@ -76,6 +76,11 @@ class MuJoCoAlone:
         self.dof = int(old.jnt_dofadr[joint]) if is_free else None
         self._changes: Changes = {}
         self._models: dict[Any, Any] = {}
+        if (old.body_gravcomp[self.group] < 0.0).any():
+            why = "its gravcomp is negative, which MuJoCo uses only beside a body with a positive one; give one of 0 or more"
+            raise Breakdown("declined", why)
+        if (self.damping < 0.0).any():
+            raise Breakdown("declined", "the damping of its joint is negative, with which it gains speed; give one of 0 or more")
 
     def changed(self, changes: Changes) -> "MuJoCoAlone":
         """The same with other settings."""

@@ -8,6 +8,7 @@ from support.model_files import FREE, body_of, findings_of
 from dropspin.comparisons.diagnosis.flight import fall
 from dropspin.comparisons.diagnosis.landing import rest
 from dropspin.comparisons.diagnosis.study import QUESTIONS
+from dropspin.comparisons.running.driving import Breakdown
 
 LID = '<geom name="lid" type="box" size=".1 .1 .01" pos="0 0 .05" mass=".1" friction="1.5"/>'
 SOLE = '<geom name="sole" type="box" size=".1 .1 .04" mass="1" {}/>'
@@ -85,6 +86,18 @@ def test_gravcomp_of_a_welded_part_lifts_its_own_weight(tmp_path):
     assert answer.in_force == pytest.approx(0.25 * 9.81)
     assert (found.kind, body.settings["gravcomp"].text) == ("setting", 'gravcomp="1"')
     assert found.remedies[0].text == '<body name="w" gravcomp="0"> (model.xml, line 1)'
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        ('<body name="b" gravcomp="-1"><freejoint/><geom size=".1"/></body>', "its gravcomp is negative"),
+        ('<body name="b"><joint type="free" damping="-1"/><geom size=".1"/></body>', "the damping of its joint is negative"),
+    ],
+)
+def test_settings_that_mujoco_uses_in_part_or_that_add_energy_are_declined(tmp_path, body, why):
+    with pytest.raises(Breakdown, match=why):
+        body_of(tmp_path, body)
 
 
 def test_distance_of_a_step_that_does_not_divide_a_second_is_that_in_a_second(tmp_path):

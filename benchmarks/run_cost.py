@@ -19,7 +19,7 @@ from dropspin import reference_impl
 from dropspin.comparisons.engines.mujoco_engine import MuJoCo, MuJoCoBatch, MuJoCoSimulation
 from dropspin.comparisons.engines.pybullet_engine import PyBullet, PyBulletSimulation
 from dropspin.comparisons.engines.wang import Wang, WangBatch, WangSimulation, reference_body, reference_world
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.arguments import EngineEntry
 
 DT = 4e-3
 JOBS = 10_000

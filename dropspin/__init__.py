@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from dropspin.comparisons.engines.registry import engine_names as engine_names
     from dropspin.comparisons.judging.error_budget import ErrorBudget as ErrorBudget
     from dropspin.comparisons.judging.error_budget import error_budget as error_budget
+    from dropspin.comparisons.limits.study import RobustnessStudy as RobustnessStudy
+    from dropspin.comparisons.limits.study import find_limits as find_limits
     from dropspin.comparisons.logs.check import log_check as log_check
     from dropspin.comparisons.logs.compare import LogComparison as LogComparison
     from dropspin.comparisons.logs.compare import log_compare as log_compare
@@ -58,8 +60,6 @@ if TYPE_CHECKING:
     from dropspin.comparisons.results.results import Results as Results
     from dropspin.comparisons.results.store import load_results as load_results
     from dropspin.comparisons.results.table import Measurement as Measurement
-    from dropspin.comparisons.robustness.study import RobustnessStudy as RobustnessStudy
-    from dropspin.comparisons.robustness.study import find_limits as find_limits
     from dropspin.comparisons.running.driving import simulate as simulate
     from dropspin.comparisons.running.process_limits import ResourceLimits as ResourceLimits
     from dropspin.comparisons.running.run import DEFAULT_DTS as DEFAULT_DTS
@@ -71,7 +71,7 @@ if TYPE_CHECKING:
     from dropspin.comparisons.sweeps.spec import load_sweep as load_sweep
     from dropspin.comparisons.symmetries.study import symmetries as symmetries
     from dropspin.comparisons.symmetries.twins import twins as twins
-    from dropspin.comparisons.tradeoff.points import TradeOff as TradeOff
+    from dropspin.comparisons.tradeoff.pareto import TradeOff as TradeOff
     from dropspin.comparisons.tradeoff.study import tradeoff as tradeoff
     from dropspin.reports import plots as plots
     from dropspin.reports.run_folder import write_report as write_report

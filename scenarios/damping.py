@@ -5,7 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from dropspin.scenarios.tables import NotNegative, Number, Positive, Table
+from dropspin.scenarios.field_types import NotNegative, Number, Positive, Table
 
 MOTIONS = ("linear", "angular")
 Share = Annotated[Number, Field(gt=0, le=1)]

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.scenarios.bodies.surface import depth_below_centre
+from dropspin.scenarios.field_types import unit
 from dropspin.scenarios.model import Ensemble, Scenario
 from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, RATES, Array
-from dropspin.scenarios.tables import unit
 
 DRAWS_PER_BLOCK = 1024  # generated together, however many of them are requested
 GRID_SIZE = 4001  # angles at which the distribution is tabulated

@@ -14,11 +14,11 @@ from pydantic import ValidationError
 
 from dropspin.scenarios.bodies.mesh_files import read_mesh
 from dropspin.scenarios.errors import DropspinError, SceneError, SceneWarning, did_you_mean
+from dropspin.scenarios.field_types import LARGEST
 from dropspin.scenarios.files import read_file
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.problems import scene_name
 from dropspin.scenarios.recording import with_recording
-from dropspin.scenarios.tables import LARGEST
 from dropspin.scenarios.validation import Alternatives, first_problem, shown
 
 CATALOGUE = Path(__file__).parent / "catalogue"

@@ -11,11 +11,11 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.bodies.surface import depth_below_centre
 from dropspin.scenarios.damping import Damping
+from dropspin.scenarios.field_types import NotNegative, Number, Positive, Table, Vector, unit
 from dropspin.scenarios.recording import Recording, start_of
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, PARTS, Array
 from dropspin.scenarios.surfaces import Floor, Surface, Wall
-from dropspin.scenarios.tables import NotNegative, Number, Positive, Table, Vector, unit
 from dropspin.scenarios.text import Prose, Text, joined, verify_line
 
 TOUCHING = 1e-9

@@ -16,10 +16,10 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
 from dropspin.scenarios.errors import DropspinError, SceneError, did_you_mean
+from dropspin.scenarios.field_types import AS_LISTS, Positive, Table, rows
 from dropspin.scenarios.files import read_file
 from dropspin.scenarios.rotations import length
 from dropspin.scenarios.state import ORIENTATION, PARTS, Array
-from dropspin.scenarios.tables import AS_LISTS, Positive, Table, rows
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import shown, validated
 

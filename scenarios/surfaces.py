@@ -6,9 +6,9 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
+from dropspin.scenarios.field_types import NotNegative, Number, Positive, Table, Vector, unit
 from dropspin.scenarios.rotations import turned_states
 from dropspin.scenarios.state import POSITION, Array
-from dropspin.scenarios.tables import NotNegative, Number, Positive, Table, Vector, unit
 
 
 class Surface(Table):

@@ -8,7 +8,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 
 from dropspin.scenarios.errors import DropspinError, did_you_mean
-from dropspin.scenarios.tables import LARGEST
+from dropspin.scenarios.field_types import LARGEST
 
 Kind = TypeVar("Kind", bound=BaseModel)
 Problem = Mapping[str, Any]

@@ -10,9 +10,9 @@ from dropspin.comparisons.conformance.motions import check_motion
 from dropspin.comparisons.conformance.outcomes import OUTCOMES, CheckOutcome, CheckResult, described, whole_traceback
 from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.engines.base import Diverged, Engine
+from dropspin.comparisons.running.arguments import EngineEntry, ignore
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_entries import present_entry
-from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.scenarios.errors import verify_known

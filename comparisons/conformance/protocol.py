@@ -16,7 +16,7 @@ from dropspin.comparisons.conformance.motions import explain_start
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted, described
 from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, FLIGHTS, PROBES, accepted_scene, recorded, state_after
 from dropspin.comparisons.engines.base import Diverged, Engine, Simulation
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.verification import (
     MULTIPLE,
     BuildMismatch,

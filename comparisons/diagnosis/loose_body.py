@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dropspin.comparisons.diagnosis.geometries import AXES, DIRECTIONS, VOLUMES, Part, Support
-from dropspin.comparisons.diagnosis.source import Ignored, Setting
+from dropspin.comparisons.diagnosis.xml_file import Ignored, Setting
 from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import SPIN, UP, Array

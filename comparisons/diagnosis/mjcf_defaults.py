@@ -1,6 +1,6 @@
 """Where a setting of an MJCF file was written: in an element, in the defaults that apply to it, or among the options."""
 
-from dropspin.comparisons.diagnosis.source import Element, Setting
+from dropspin.comparisons.diagnosis.xml_file import Element, Setting
 
 
 def mjcf_setting(element: Element, attribute: str) -> Setting | None:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import mujoco
 
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM, MuJoCoFile
-from dropspin.comparisons.diagnosis.source import Element
+from dropspin.comparisons.diagnosis.xml_file import Element
 
 
 def body_element(file: MuJoCoFile, number: int) -> Element | None:

@@ -16,8 +16,8 @@ from dropspin.comparisons.diagnosis.mujoco_compiled import placed
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of
 from dropspin.comparisons.diagnosis.mujoco_recompiled import LEAST
 from dropspin.comparisons.diagnosis.mujoco_shapes import ALONG, distance_to, kind_of
-from dropspin.comparisons.diagnosis.source import read_source
 from dropspin.comparisons.diagnosis.urdf_file import package_remedy, verify_one_root
+from dropspin.comparisons.diagnosis.xml_file import read_source
 from dropspin.comparisons.engines.mujoco_simulation import quiet
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known

@@ -16,8 +16,8 @@ from dropspin.comparisons.diagnosis.mujoco_file import BODY
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, with_exact_volumes, without, without_mass_of, without_visual
 from dropspin.comparisons.diagnosis.mujoco_shapes import mesh_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText, differ
-from dropspin.comparisons.diagnosis.source import Ignored, Setting
 from dropspin.comparisons.diagnosis.urdf_file import used_by_neither_engine
+from dropspin.comparisons.diagnosis.xml_file import Ignored, Setting
 
 IN_FORCE = {"lateral_friction": 1.0, "rolling_friction": 0.0, "spinning_friction": 0.0, "restitution": 0.0}
 IN_FORCE |= {"inertia_scaling": 1.0} | dict.fromkeys(("stiffness", "damping", "friction_anchor"), math.nan)

@@ -13,7 +13,7 @@ from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
 from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
 from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, pair_element
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, without
-from dropspin.comparisons.diagnosis.source import Element, Setting, tagged
+from dropspin.comparisons.diagnosis.xml_file import Element, Setting, tagged
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM, OPTION
 from dropspin.comparisons.engines.options import spelled
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric

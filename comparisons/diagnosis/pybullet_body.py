@@ -17,8 +17,8 @@ from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, LooseBody, MassProperties
 from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Link, read_links
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
-from dropspin.comparisons.diagnosis.source import Ignored, Setting
 from dropspin.comparisons.diagnosis.urdf_file import UrdfFile, package_remedy
+from dropspin.comparisons.diagnosis.xml_file import Ignored, Setting
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.pybullet_simulation import CHUNK, Z_TO_Y

@@ -10,8 +10,8 @@ import numpy as np
 from dropspin.comparisons.diagnosis.answers import digits
 from dropspin.comparisons.diagnosis.geometries import Part, mesh_shape, solid
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
-from dropspin.comparisons.diagnosis.source import Element, Ignored, Setting
 from dropspin.comparisons.diagnosis.urdf_file import UrdfFile, used_by_neither_engine
+from dropspin.comparisons.diagnosis.xml_file import Element, Ignored, Setting
 from dropspin.comparisons.engines.pybullet_simulation import Z_TO_Y
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.bodies import Capsule, Cylinder, Shape

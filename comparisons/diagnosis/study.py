@@ -16,11 +16,11 @@ from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.remedies import Question, Targets, answers_to
 from dropspin.comparisons.diagnosis.sliding import creep, roll, slide
-from dropspin.comparisons.diagnosis.source import Setting
+from dropspin.comparisons.diagnosis.xml_file import Setting
 from dropspin.comparisons.engines.options import engine_name
+from dropspin.comparisons.running.arguments import EngineEntry, ignore
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_entries import present_entry
-from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses

@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from dropspin.comparisons.diagnosis.source import Element, read_source
+from dropspin.comparisons.diagnosis.xml_file import Element, read_source
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.text import printable

@@ -17,10 +17,10 @@ from dropspin.comparisons.logs.flights import Flights, flights_of
 from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
 from dropspin.comparisons.logs.log import Cause, Finding, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
-from dropspin.comparisons.logs.other_readings import in_other_readings, of_lengths, of_quaternions, orders_of_axes
+from dropspin.comparisons.logs.other_conventions import in_other_readings, of_lengths, of_quaternions, orders_of_axes
 from dropspin.comparisons.logs.recording_faults import of_floor, of_frames, of_rates, ratios_of_rates
 from dropspin.comparisons.logs.rest import rests
-from dropspin.comparisons.running.inputs import ignore
+from dropspin.comparisons.running.arguments import ignore
 from dropspin.scenarios.bodies.inertia import in_numbers
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import unrotate

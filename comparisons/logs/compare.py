@@ -32,9 +32,9 @@ from dropspin.comparisons.logs.flights import Flights, Start
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.intervals import groups, interval_of_share, intervals_of_means
 from dropspin.comparisons.logs.log import Log
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_entries import engine_entries
-from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.scenarios.state import Array

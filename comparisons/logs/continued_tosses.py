@@ -12,8 +12,8 @@ from dropspin.comparisons.logs.flights import Flights, Start, flights_of
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.intervals import FEWEST
 from dropspin.comparisons.logs.log import Log, load_log
+from dropspin.comparisons.running.arguments import EngineEntry, ignore
 from dropspin.comparisons.running.driving import Breakdown, record_batch, verify_accepted
-from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses

@@ -11,7 +11,7 @@ from dropspin.comparisons.logs.flight import ACCELERATION, accelerations, fallin
 from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, flights_of, heights
 from dropspin.comparisons.logs.header import LENGTHS, TIMES
 from dropspin.comparisons.logs.log import Log
-from dropspin.comparisons.running.inputs import ignore
+from dropspin.comparisons.running.arguments import ignore
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.state import Array
 

@@ -16,9 +16,9 @@ from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, heights
 from dropspin.comparisons.logs.grids import FIRST_GRID, Problem, Profile, problem_of, profile_of
 from dropspin.comparisons.logs.intervals import LEVEL, expanded
 from dropspin.comparisons.logs.log import Log
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_entries import engine_entries
-from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.scenarios.state import ORIENTATION, POSITION, Array

@@ -18,8 +18,8 @@ import numpy as np
 from dropspin.comparisons.logs.continued_tosses import Launches, launches, poses, recorded, time_step, usable
 from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.intervals import resamples
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown
-from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.scenarios.rotations import rotation_vector
 from dropspin.scenarios.state import ORIENTATION, POSITION, Array

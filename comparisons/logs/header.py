@@ -7,10 +7,10 @@ import numpy as np
 from pydantic import Field
 
 from dropspin.scenarios.bodies import Body
+from dropspin.scenarios.field_types import Number, Positive, Table, Vector
 from dropspin.scenarios.recording import Noise
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.surfaces import Floor
-from dropspin.scenarios.tables import Number, Positive, Table, Vector
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import validated
 

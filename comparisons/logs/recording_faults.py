@@ -11,7 +11,7 @@ from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.intervals import intervals_of_means
 from dropspin.comparisons.logs.log import Cause, Finding
 from dropspin.comparisons.logs.noise import Noise
-from dropspin.comparisons.logs.other_readings import UNTRACKED
+from dropspin.comparisons.logs.other_conventions import UNTRACKED
 from dropspin.comparisons.logs.rest import rests
 from dropspin.comparisons.running.foreign_motions import missing_frames
 from dropspin.scenarios.rotations import cross, length, rotate, unrotate

@@ -13,8 +13,8 @@ from pydantic import AfterValidator, Field, model_validator
 from dropspin.comparisons.published.results import ABSENT, TOLERANCE
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.errors import verify_known
+from dropspin.scenarios.field_types import Table
 from dropspin.scenarios.loading import from_mapping, read_toml
-from dropspin.scenarios.tables import Table
 from dropspin.scenarios.validation import validated
 
 DATA = Path(__file__).parent / "data"

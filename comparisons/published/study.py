@@ -9,9 +9,9 @@ from dropspin.comparisons.published.quantities import quantity
 from dropspin.comparisons.published.results import Result, with_value
 from dropspin.comparisons.published.sources import Case, Group, Source, sources
 from dropspin.comparisons.published.tosses import acosta_cube
+from dropspin.comparisons.running.arguments import EngineEntry, ignore
 from dropspin.comparisons.running.driving import Breakdown, finite, try_record
 from dropspin.comparisons.running.engine_entries import engine_entry
-from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.scenarios import DropspinError, Scenario

@@ -17,9 +17,9 @@ import numpy as np
 
 from dropspin.comparisons.published.results import SHOWN, Result, with_value
 from dropspin.comparisons.published.sources import Source
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_entries import engine_entry
-from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.files import read_file

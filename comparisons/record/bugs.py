@@ -28,8 +28,8 @@ from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.parallel import as_done
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
+from dropspin.scenarios.field_types import Table
 from dropspin.scenarios.loading import read_toml
-from dropspin.scenarios.tables import Table
 
 FILE = Path(__file__).with_name("bugs.toml")
 READY = "ready"

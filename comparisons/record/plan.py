@@ -9,8 +9,8 @@ from pydantic import Field
 from dropspin.comparisons.engines.packages import is_npm, numbers_of
 from dropspin.comparisons.results.complete_folders import sha256
 from dropspin.scenarios import load
+from dropspin.scenarios.field_types import Table
 from dropspin.scenarios.loading import read_toml
-from dropspin.scenarios.tables import Table
 
 FILE = Path(__file__).with_name("plan.toml")
 NUMPY_1 = ["numpy<2", "pandas<3", "pyarrow<26"]

@@ -21,9 +21,9 @@ from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.results.complete_folders import sha256
 from dropspin.comparisons.results.provenance import STAMPED
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, divergence, record, record_batch, verify_accepted
 from dropspin.comparisons.running.engine_entries import engine_entry
-from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.run import measure

@@ -16,9 +16,9 @@ from dropspin.comparisons.regressions.checking import Checked
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.table import Case, Measurement, as_table
 from dropspin.comparisons.running.ablation import explaining
+from dropspin.comparisons.running.arguments import ignore
 from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.engine_study import EngineStudy
-from dropspin.comparisons.running.inputs import ignore
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.start_phases import StartPhase

@@ -28,9 +28,9 @@ from dropspin.comparisons.results.provenance import digest
 from dropspin.comparisons.results.table import OF_SYMMETRIES
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import did_you_mean
+from dropspin.scenarios.field_types import Table
 from dropspin.scenarios.loading import read_toml
 from dropspin.scenarios.model import current_label
-from dropspin.scenarios.tables import Table
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import shown, validated
 

@@ -12,7 +12,7 @@ from dropspin.comparisons.engines.base import Diverged, Engine, KnownLimitation
 from dropspin.comparisons.engines.exceptions import described, short
 from dropspin.comparisons.engines.registry import engine as engine_named
 from dropspin.comparisons.judging.verdicts import Verdict
-from dropspin.comparisons.running.inputs import SceneLike, as_scene, ignore, verify_time_step
+from dropspin.comparisons.running.arguments import SceneLike, as_scene, ignore, verify_time_step
 from dropspin.comparisons.running.progress import OnSimulations
 from dropspin.comparisons.running.verification import (
     BuildMismatch,

@@ -7,8 +7,8 @@ from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissin
 from dropspin.comparisons.engines.registry import engine as engine_named
 from dropspin.comparisons.engines.registry import is_foreign, parsed, verify_name
 from dropspin.comparisons.engines.stand_in import Traits, stand_in, traits
+from dropspin.comparisons.running.arguments import EngineEntry, described_value, several
 from dropspin.comparisons.running.driving import Breakdown
-from dropspin.comparisons.running.inputs import EngineEntry, described_value, several
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.scenarios import DropspinError

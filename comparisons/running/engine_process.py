@@ -17,8 +17,8 @@ from dropspin.comparisons.engines.adapter_code import adapter_code
 from dropspin.comparisons.engines.base import EngineBroken
 from dropspin.comparisons.engines.registry import constructed
 from dropspin.comparisons.engines.stand_in import StandIn
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import classify
-from dropspin.comparisons.running.inputs import EngineEntry
 
 PROCESSES = Path("/proc")
 PR_SET_PDEATHSIG = 1

@@ -31,10 +31,10 @@ from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.provenance import motion_digest
 from dropspin.comparisons.results.table import Case, Measurement
 from dropspin.comparisons.running.ablation import explaining, written_out
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, divergence
 from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.engine_run import EngineRun, run_engine
-from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.perturbed_starts import changes_of_metrics, number_of_simulations
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress

@@ -8,7 +8,7 @@ import numpy as np
 
 from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.perturbed_starts import number_of_simulations
 from dropspin.comparisons.running.start_phases import StartPhase, number_of_phases
 from dropspin.comparisons.running.timing import Timings

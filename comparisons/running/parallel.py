@@ -7,7 +7,7 @@ from threading import Lock
 from typing import TypeVar
 
 from dropspin.comparisons.results.interrupts import finished, interrupts_deferred
-from dropspin.comparisons.running.inputs import EngineEntry, ignore
+from dropspin.comparisons.running.arguments import EngineEntry, ignore
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.reference_impl.threads import usable_cores

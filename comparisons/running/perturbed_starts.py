@@ -7,9 +7,9 @@ import numpy as np
 
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import metrics_for
+from dropspin.comparisons.running.arguments import MOST_ROWS, EngineEntry
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_run import motions_from
-from dropspin.comparisons.running.inputs import MOST_ROWS, EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.start_phases import StartPhase, compare
 from dropspin.scenarios import Scenario

@@ -23,9 +23,9 @@ from pebble import ProcessExpired, ProcessPool
 from dropspin.comparisons.engines.exceptions import described
 from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.results.interrupts import finished, interrupts_deferred
+from dropspin.comparisons.running.arguments import EngineEntry, ignore
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_process import PROCESSES, call, memory_for_data, start_process
-from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.process_limits import COMPILATION, GIB, WALL_TIME_FACTOR, ResourceLimits
 from dropspin.comparisons.running.progress import OnSimulations
 from dropspin.scenarios import DropspinError

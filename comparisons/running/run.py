@@ -13,10 +13,10 @@ from dropspin.comparisons.measuring.batch_quantities import compile_states
 from dropspin.comparisons.measuring.metrics import values_of
 from dropspin.comparisons.results.provenance import provenance
 from dropspin.comparisons.results.results import Results, joined
+from dropspin.comparisons.running.arguments import EngineEntry, SceneLike, as_scene, as_scenes, ignore, several, verify_time_step
 from dropspin.comparisons.running.engine_entries import engine_entries
 from dropspin.comparisons.running.forecast import Forecast, forecast
 from dropspin.comparisons.running.foreign_motions import verify_motion
-from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, as_scenes, ignore, several, verify_time_step
 from dropspin.comparisons.running.parallel import started_crews, work_in_parallel
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses

@@ -16,9 +16,9 @@ from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
 from dropspin.comparisons.results.results import Results, TrajectoryKey
 from dropspin.comparisons.results.table import Measurement, as_table
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.engine_study import EngineStudy, Outcome
 from dropspin.comparisons.running.ensembles import judge_differences, judge_means
-from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress
 from dropspin.comparisons.running.start_phases import StartPhase, compare, phases_at, with_exact_motions

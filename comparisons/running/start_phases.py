@@ -17,8 +17,8 @@ from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS, Average
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.measuring.state_quantities import States
 from dropspin.comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
+from dropspin.comparisons.running.arguments import MOST_ROWS
 from dropspin.comparisons.running.engine_run import EngineRun
-from dropspin.comparisons.running.inputs import MOST_ROWS
 from dropspin.scenarios import Scenario, Trajectory, Truth
 from dropspin.scenarios.state import RATES
 from dropspin.scenarios.truths.flight import flight_states

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dropspin.comparisons.engines.base import Engine, numpy_array
+from dropspin.comparisons.running.arguments import MOST_STEPS, EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, classify, verify_accepted
-from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress
 from dropspin.scenarios import Scenario

@@ -19,7 +19,7 @@ from dropspin import reference_impl
 from dropspin.comparisons.engines.wang import Wang, reference_bodies, reference_world
 from dropspin.comparisons.measuring.batch_quantities import BATCH_BYTES, motions_side_by_side
 from dropspin.comparisons.measuring.motion_quantities import Setup
-from dropspin.comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS
+from dropspin.comparisons.running.arguments import FEWEST_STEPS, MOST_STEPS
 from dropspin.comparisons.running.verification import UNIT_TOLERANCE
 from dropspin.comparisons.sweeps.jobs import OPTION, Jobs, scene_of
 from dropspin.comparisons.sweeps.outcomes import Outcomes, not_run, requested_metrics, standard_metrics
@@ -27,10 +27,10 @@ from dropspin.scenarios import Scenario, SceneError, Trajectory
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.damping import MOTIONS
 from dropspin.scenarios.ensemble import clearances, spread_starts
-from dropspin.scenarios.fields import Path, path_of, set_field, with_fields
+from dropspin.scenarios.field_names import Path, path_of, set_field, with_fields
+from dropspin.scenarios.field_types import unit
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, UP, Array
-from dropspin.scenarios.tables import unit
 
 FRICTION = "floor.friction"
 ARRAY_FIELDS = {("floor", "restitution"), ("floor", "friction"), ("floor", "rest_speed"), ("damping", "linear"), ("damping", "angular")}

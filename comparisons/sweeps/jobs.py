@@ -16,7 +16,7 @@ from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.sweeps.axes import Drawn, Indices, SweepAxis
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.ensemble import spread_start
-from dropspin.scenarios.fields import content_of, path_of, set_field, with_fields
+from dropspin.scenarios.field_names import content_of, path_of, set_field, with_fields
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.validation import shown
 

@@ -14,8 +14,8 @@ import pyarrow as pa
 from dropspin.comparisons.engines.stand_in import code_of
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.results.provenance import code, provenance, versions
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown
-from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.sweeps.arrays import run_side_by_side

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
+from dropspin.comparisons.running.arguments import described_value, ignore
 from dropspin.comparisons.running.cluster import connected
-from dropspin.comparisons.running.inputs import described_value, ignore
 from dropspin.comparisons.running.parallel import as_done, started_crews, work_in_parallel
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses

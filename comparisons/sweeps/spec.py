@@ -9,16 +9,16 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.running.arguments import verify_time_step
 from dropspin.comparisons.running.engine_entries import present_entry
-from dropspin.comparisons.running.inputs import verify_time_step
 from dropspin.comparisons.sweeps.axes import Drawn, Listed, Spaced, Spacing, SweepAxis
 from dropspin.comparisons.sweeps.jobs import OPTION, Sweep, configured
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS
 from dropspin.scenarios import DropspinError, Scenario, SceneError, load
 from dropspin.scenarios.errors import verify_known
-from dropspin.scenarios.fields import NoSuchField, verify_field, with_fields
+from dropspin.scenarios.field_names import NoSuchField, verify_field, with_fields
+from dropspin.scenarios.field_types import Number, Positive, Table
 from dropspin.scenarios.loading import TOO_LARGE, read_toml
-from dropspin.scenarios.tables import Number, Positive, Table
 from dropspin.scenarios.validation import shown, validated
 
 MOST_JOBS = 10**15

@@ -12,9 +12,9 @@ import numpy as np
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.differences import differences
 from dropspin.comparisons.measuring.symmetries import AGAIN, BATCH, BITWISE, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES, Symmetry
+from dropspin.comparisons.running.arguments import EngineEntry, SceneLike, as_scenes, ignore, verify_time_step
 from dropspin.comparisons.running.driving import Breakdown, classify, finite, record_batch, try_record
 from dropspin.comparisons.running.engine_entries import engine_entries
-from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scenes, ignore, verify_time_step
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.perturbed_starts import perturbed
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.differences import differences
 from dropspin.comparisons.measuring.motion_quantities import Motions
+from dropspin.comparisons.running.arguments import EngineEntry, SceneLike, as_scenes, ignore, verify_time_step
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_entries import engine_entries
-from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scenes, ignore, verify_time_step
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses

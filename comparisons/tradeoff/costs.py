@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, classify
-from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.timing import TIMING_REPEATS, TimedSteps, time_per_step, time_steps, timings, timings_in_flight
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.state import Array

@@ -18,8 +18,8 @@ from dropspin.comparisons.engines.exceptions import short
 from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.running.arguments import MOST_STEPS, EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, divergence, record, verify_accepted
-from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.start_phases import StartPhase, start_phases
 from dropspin.scenarios import Scenario, truth_for

@@ -14,15 +14,15 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.metrics import leading_metric, metrics_for
+from dropspin.comparisons.running.arguments import EngineEntry, SceneLike, as_scene, described_value, ignore
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_entries import engine_entries
-from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, described_value, ignore
 from dropspin.comparisons.running.parallel import as_jobs, results_in_parallel
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.tradeoff.costs import WORLDS, cost, costs_per_world, load, memory_per_world
 from dropspin.comparisons.tradeoff.errors import BUDGET, Ladder, errors_over_steps
-from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff, spread
+from dropspin.comparisons.tradeoff.pareto import CostPoint, TradeOff, spread
 from dropspin.scenarios import DropspinError, Scenario, truth_for
 from dropspin.scenarios.errors import verify_known
 

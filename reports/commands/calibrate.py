@@ -6,7 +6,7 @@ import click
 
 from dropspin.reports.commands.options import as_json
 from dropspin.reports.terminal.interrupts import stop_if_interrupted
-from dropspin.reports.terminal.safe import echo
+from dropspin.reports.terminal.safe_output import echo
 
 
 @click.command("calibrate")

@@ -43,8 +43,8 @@ def limits_command(scenes: tuple[str, ...], axes: tuple[str, ...], output: str, 
     The default is five scenes (two spins, a ball, a box, a block), with engines and methods that give different results for them. The
     default study takes some minutes.
     """
-    from dropspin.comparisons.robustness.axes import AXES
-    from dropspin.comparisons.robustness.study import SCENES, find_limits
+    from dropspin.comparisons.limits.axes import AXES
+    from dropspin.comparisons.limits.study import SCENES, find_limits
     from dropspin.reports.stories.limits import Limits
     from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar

@@ -3,7 +3,7 @@
 import click
 
 from dropspin.reports.commands.options import as_json, output_option
-from dropspin.reports.terminal.safe import echo
+from dropspin.reports.terminal.safe_output import echo
 
 
 @click.command("check")

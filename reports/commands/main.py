@@ -11,7 +11,7 @@ from pathlib import Path
 
 import click
 
-from dropspin.reports.commands import surroundings
+from dropspin.reports.commands import environment_checks
 from dropspin.reports.terminal.interrupts import handle_interrupts, stop_if_interrupted
 from dropspin.reports.terminal.streams import error_of, unfailing
 
@@ -51,7 +51,7 @@ def main() -> None:
 
 def _run_and_report_errors() -> int:
     """Run the command, print its error if it has one, and return the exit code."""
-    if problem := surroundings.problem():
+    if problem := environment_checks.problem():
         click.echo(f"dropspin: {problem}.", err=True)
         return 2
     os.environ.pop("MPLBACKEND", None)  # plots become files; the backend of a notebook need not be installed here
@@ -65,9 +65,11 @@ def _run_and_report_errors() -> int:
         _say(_text(error))
         return 2
     except Exception as error:
-        limit = surroundings.limited_to()
+        limit = environment_checks.limited_to()
         if limit is not None or isinstance(error, MemoryError):
-            click.echo(f"dropspin: {surroundings.shortage(limit)} ({type(error).__name__}: {' '.join(str(error).split())}).", err=True)
+            click.echo(
+                f"dropspin: {environment_checks.shortage(limit)} ({type(error).__name__}: {' '.join(str(error).split())}).", err=True
+            )
             return 2
         click.echo("dropspin: internal error; please report the following output.", err=True)
         traceback.print_exc()
@@ -114,7 +116,7 @@ def _text(error: Exception) -> str:
 
 def _say(message: str) -> None:
     """Print an error message as one line. Names in a file may have any length: of a longer line, the middle is left out."""
-    from dropspin.reports.terminal.safe import echo
+    from dropspin.reports.terminal.safe_output import echo
 
     line = " ".join(message.splitlines())
     if len(line) > LONGEST_MESSAGE:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from dropspin.reports.terminal.safe import echo
+from dropspin.reports.terminal.safe_output import echo
 
 TEMPLATE = Path(__file__).parents[1] / "adapter_template"
 NAME = r"[A-Za-z][A-Za-z0-9_]{0,59}"

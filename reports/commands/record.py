@@ -7,7 +7,7 @@ import click
 
 from dropspin.reports.commands.options import engines_option, jobs_option, output_option, time_limit_option, write_text
 from dropspin.reports.terminal.interrupts import stop_if_interrupted
-from dropspin.reports.terminal.safe import echo
+from dropspin.reports.terminal.safe_output import echo
 
 if TYPE_CHECKING:
     from dropspin.comparisons.running.process_limits import ResourceLimits

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from dropspin.reports.commands.options import output_option
-from dropspin.reports.terminal.safe import echo
+from dropspin.reports.terminal.safe_output import echo
 
 
 @click.command("publish")

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from dropspin.reports.commands.options import POSITIVE, scenes_argument
-from dropspin.reports.terminal.safe import echo
+from dropspin.reports.terminal.safe_output import echo
 
 
 @click.command("replay")

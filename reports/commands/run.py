@@ -20,7 +20,7 @@ from dropspin.reports.commands.options import (
     write_text,
 )
 from dropspin.reports.terminal.interrupts import stop_if_interrupted
-from dropspin.reports.terminal.safe import echo
+from dropspin.reports.terminal.safe_output import echo
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

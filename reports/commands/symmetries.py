@@ -38,7 +38,7 @@ def symmetries_command(scenes: tuple[str, ...], dt: float, output: str, json_out
     from dropspin.reports.stories.symmetries import Symmetries, worst_lost
     from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar
-    from dropspin.reports.terminal.safe import echo
+    from dropspin.reports.terminal.safe_output import echo
     from dropspin.scenarios import load
 
     with written_study(output, json_output) as keep:

@@ -16,7 +16,7 @@ from dropspin.comparisons.results.results import SMALLEST_STATED, Results
 from dropspin.comparisons.results.table import OF_SYMMETRIES
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from dropspin.reports.document import Document
-from dropspin.reports.html.strip import strip_of
+from dropspin.reports.html.film_strip import strip_of
 from dropspin.reports.pages import page, with_minus
 from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.chart_data import chart_data

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dropspin.comparisons.robustness.axes import Axis
-from dropspin.comparisons.robustness.failure_modes import FAILURE_MODES
-from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy
+from dropspin.comparisons.limits.axes import Axis
+from dropspin.comparisons.limits.failure_modes import FAILURE_MODES
+from dropspin.comparisons.limits.study import AxisScan, RobustnessStudy
 from dropspin.reports.plots.chart import Chart, Line, draw
 from dropspin.reports.plots.style import plain
 

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from dropspin.comparisons.judging.verdicts import FAILURES
+from dropspin.comparisons.limits.study import RobustnessStudy
 from dropspin.comparisons.measuring.predictions import spins_steadily
 from dropspin.comparisons.results.results import Results
-from dropspin.comparisons.robustness.study import RobustnessStudy
 from dropspin.reports.plots.bounces import bounce_ladder
 from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.convergence import error_over_dt
@@ -19,7 +19,7 @@ from dropspin.reports.plots.tradeoff import error_over_cost, throughput
 from dropspin.scenarios import reference_for
 
 if TYPE_CHECKING:
-    from dropspin.comparisons.tradeoff.points import TradeOff
+    from dropspin.comparisons.tradeoff.pareto import TradeOff
 
 CONVERGENCE = (
     "energy_error",

@@ -13,7 +13,7 @@ from dropspin.reports.plots.style import metric_label
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff
+    from dropspin.comparisons.tradeoff.pareto import CostPoint, TradeOff
 
 FRONT, SPREAD = 5.0, 1.0
 """Widths of the line of the Pareto front and of the bars that are spreads of timings [points]."""

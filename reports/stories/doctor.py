@@ -4,9 +4,9 @@ import sys
 from collections.abc import Sequence
 
 from dropspin.comparisons.results.provenance import processor, versions
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, simulate
 from dropspin.comparisons.running.engine_entries import engine_entry
-from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import ONE_MINUTE
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.reports.document import Rows

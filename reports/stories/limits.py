@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from dropspin.comparisons.robustness.axes import AXES
-from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, ScanPoint
+from dropspin.comparisons.limits.axes import AXES
+from dropspin.comparisons.limits.study import AxisScan, RobustnessStudy, ScanPoint
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Rows, Sentences, Table
 from dropspin.reports.plots.run_charts import limits_charts
 from dropspin.reports.stories.numbers import duration, left_out

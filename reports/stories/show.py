@@ -19,7 +19,7 @@ from dropspin.scenarios.truths import Law, other_laws
 
 if TYPE_CHECKING:
     from dropspin.comparisons.engines.base import Engine
-    from dropspin.comparisons.running.inputs import EngineEntry
+    from dropspin.comparisons.running.arguments import EngineEntry
 
 
 def scene_rows(scene: Scenario) -> Rows:
@@ -79,9 +79,9 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
     Raises:
         DropspinError: The engine cannot run, or breaks down while it builds the scene.
     """
+    from dropspin.comparisons.running.arguments import verify_time_step
     from dropspin.comparisons.running.driving import Breakdown
     from dropspin.comparisons.running.engine_entries import present_entry
-    from dropspin.comparisons.running.inputs import verify_time_step
     from dropspin.comparisons.running.process_limits import ONE_MINUTE
     from dropspin.comparisons.running.processes import EngineProcesses
 

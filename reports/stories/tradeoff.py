@@ -8,7 +8,7 @@ import numpy as np
 
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.tradeoff.errors import Ladder
-from dropspin.comparisons.tradeoff.points import LEVEL, CostPoint, TradeOff, spread
+from dropspin.comparisons.tradeoff.pareto import LEVEL, CostPoint, TradeOff, spread
 from dropspin.reports.document import Charts, Document, Heading, Part, Rows, Sentences, Table
 from dropspin.reports.plots.run_charts import tradeoff_charts
 from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, left_out, with_unit

@@ -12,7 +12,7 @@ from rich.progress import Progress as Bar
 from dropspin.comparisons.running.progress import Progress
 from dropspin.reports.stories.numbers import in_ms
 from dropspin.reports.terminal.interrupts import stop_if_interrupted
-from dropspin.reports.terminal.safe import echo, safe, styled
+from dropspin.reports.terminal.safe_output import echo, safe, styled
 from dropspin.scenarios.text import counted
 
 

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from dropspin.reports.document import Document, Heading, Paragraph, Sentences, Table
 from dropspin.reports.output import json_text
-from dropspin.reports.terminal.safe import echo, styled
+from dropspin.reports.terminal.safe_output import echo, styled
 
 SPACES = re.compile(r"(?<=\s)(?!(?<=\d\s)(?:%|\S{1,4}\b))")
 """The places at which a sentence may be broken: spaces that are not between a number and its unit."""

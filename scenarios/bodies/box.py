@@ -9,8 +9,8 @@ import numpy as np
 
 from dropspin.scenarios.bodies.inertia import Moments, is_diagonal
 from dropspin.scenarios.bodies.shape import Shape
+from dropspin.scenarios.field_types import PositiveVector
 from dropspin.scenarios.state import Array
-from dropspin.scenarios.tables import PositiveVector
 
 
 class Box(Shape):

@@ -8,8 +8,8 @@ import numpy as np
 from dropspin.scenarios.bodies.inertia import Moments
 from dropspin.scenarios.bodies.outline import Outline, around_axis, outline
 from dropspin.scenarios.bodies.shape import Shape
+from dropspin.scenarios.field_types import PositiveVector
 from dropspin.scenarios.state import Array
-from dropspin.scenarios.tables import PositiveVector
 
 
 class Ellipsoid(Shape):

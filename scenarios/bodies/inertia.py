@@ -7,8 +7,8 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, WrapValidator
 
+from dropspin.scenarios.field_types import LARGEST, PositiveVector
 from dropspin.scenarios.state import Array
-from dropspin.scenarios.tables import LARGEST, PositiveVector
 
 OF_URDF = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 ASYMMETRY = 1e-6  # of the largest entry; models are often written with few digits

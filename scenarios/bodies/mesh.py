@@ -11,8 +11,8 @@ from dropspin.scenarios.bodies.inertia import Moments, second_moments
 from dropspin.scenarios.bodies.mesh_files import Faces
 from dropspin.scenarios.bodies.outline import Outline, outline
 from dropspin.scenarios.bodies.shape import Shape
+from dropspin.scenarios.field_types import AS_LISTS, Vector, rows
 from dropspin.scenarios.state import Array
-from dropspin.scenarios.tables import AS_LISTS, Vector, rows
 
 ROUNDING = 1e-15  # of products of inertia, relative to the moments
 MOST_DRAWN = 2000  # faces; the hull of a finer mesh is drawn

@@ -7,8 +7,8 @@ import numpy as np
 
 from dropspin.scenarios.bodies.inertia import Moments
 from dropspin.scenarios.bodies.shape import Shape
+from dropspin.scenarios.field_types import Positive
 from dropspin.scenarios.state import UP, Array
-from dropspin.scenarios.tables import Positive
 
 
 class OnAxis(Shape):

@@ -17,9 +17,9 @@ from dropspin.scenarios.bodies.inertia import Moments, is_diagonal, mean_squares
 from dropspin.scenarios.bodies.outline import Outline, around_axis, outline
 from dropspin.scenarios.bodies.possible_moments import largest_multiple
 from dropspin.scenarios.bodies.surface import RIM, rise_of_centre
+from dropspin.scenarios.field_types import Positive, Table, Vector
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import Array
-from dropspin.scenarios.tables import Positive, Table, Vector
 
 INERTIA_ROUNDING = 1.001  # moments are often given with three or four digits
 AROUND = 64

@@ -9,8 +9,8 @@ from pydantic import Field, model_validator
 from dropspin.scenarios.bodies.hull import hull_corners, lowest_face
 from dropspin.scenarios.bodies.inertia import Moments, second_moments
 from dropspin.scenarios.bodies.shape import Shape, times
+from dropspin.scenarios.field_types import Positive, Vector
 from dropspin.scenarios.state import Array
-from dropspin.scenarios.tables import Positive, Vector
 
 
 class Vertices(Shape):

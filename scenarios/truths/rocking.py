@@ -35,8 +35,8 @@ from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import about, multiply
 from dropspin.scenarios.state import ORIENTATION, UP, VELOCITY, Array
 from dropspin.scenarios.surfaces import Floor
+from dropspin.scenarios.truths.edge_geometry import MIN_LEVEL, Stand, on_one_edge
 from dropspin.scenarios.truths.elliptic import argument, jacobi
-from dropspin.scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
 from dropspin.scenarios.truths.truth import Impact, Truth, impacts_of, piece
 
 PENDULUM = "the body turns about an edge as an inverted pendulum, solved with Jacobi's elliptic functions (Whittaker, section 44)"

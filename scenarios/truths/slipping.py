@@ -26,7 +26,7 @@ from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import about, multiply
 from dropspin.scenarios.state import ORIENTATION, POSITION, UP, VELOCITY, Array
 from dropspin.scenarios.surfaces import Floor
-from dropspin.scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
+from dropspin.scenarios.truths.edge_geometry import MIN_LEVEL, Stand, on_one_edge
 from dropspin.scenarios.truths.truth import Truth
 
 MIN_DEGREE, MAX_DEGREE = 16, 512  # of the Chebyshev series

@@ -12,14 +12,14 @@ from support.engines import Exact, ExactSimulation, Together
 from dropspin.comparisons.engines.base import BatchSimulation, Diverged
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.running import timing
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, simulate
-from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.run import measure
 from dropspin.comparisons.tradeoff import costs, errors, study
 from dropspin.comparisons.tradeoff.errors import DIVISIONS, Ladder, output_interval
-from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff, spread
+from dropspin.comparisons.tradeoff.pareto import CostPoint, TradeOff, spread
 from dropspin.comparisons.tradeoff.study import tradeoff
 from dropspin.scenarios import DropspinError, load
 

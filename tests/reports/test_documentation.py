@@ -155,8 +155,8 @@ def test_commands_of_the_pages_exist_with_their_options(page):
 
 def quoted_constants():
     """By page, phrases with the constants of the code that they quote."""
-    from dropspin.comparisons.robustness import runner
-    from dropspin.comparisons.robustness import study as limits
+    from dropspin.comparisons.limits import runner
+    from dropspin.comparisons.limits import study as limits
     from dropspin.comparisons.running.start_phases import START_PHASES
     from dropspin.comparisons.tradeoff import costs, errors, points, study
 

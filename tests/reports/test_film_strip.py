@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dropspin as ds
-from dropspin.reports.html.strip import LEFT, PANEL, TOP, strip_of
+from dropspin.reports.html.film_strip import LEFT, PANEL, TOP, strip_of
 from dropspin.reports.replay.motions import replay_together
 
 

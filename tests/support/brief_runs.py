@@ -9,7 +9,7 @@ from unittest import mock
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.running import start_phases, timing
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.scenarios import Scenario
 
 FEW, OF_CATALOGUE, ALL = 4, 8, start_phases.START_PHASES

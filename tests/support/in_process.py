@@ -11,9 +11,9 @@ from threading import RLock
 from unittest import mock
 
 from dropspin.comparisons.engines.stand_in import StandIn
+from dropspin.comparisons.running.arguments import ignore
 from dropspin.comparisons.running.driving import Breakdown, classify
 from dropspin.comparisons.running.engine_run import motions_from, run_engine
-from dropspin.comparisons.running.inputs import ignore
 from dropspin.comparisons.running.processes import Closed, EngineProcesses
 
 REAL = {name: getattr(EngineProcesses, name) for name in ("start", "call", "renew")}

@@ -21,7 +21,7 @@ from dropspin.comparisons.engines.pybullet_engine import PyBullet
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.running import timing as clock_of_engines
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.run import run
 from dropspin.comparisons.running.timing import time_steps
 from dropspin.scenarios import load

@@ -12,7 +12,7 @@ from dropspin.comparisons.conformance.checks import run_check
 from dropspin.comparisons.conformance.impacts import AT_START, BY_SLIP, IN_NORMAL, OF_NOTE
 from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.arguments import EngineEntry
 
 inv = np.linalg.inv
 OWN_LAW = "impacts follow the note law, as the engine states"

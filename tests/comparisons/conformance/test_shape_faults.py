@@ -7,7 +7,7 @@ from support import engines as made
 from dropspin.comparisons.conformance.checks import run_check
 from dropspin.comparisons.engines import mujoco_model
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.arguments import EngineEntry
 
 KINDS = mujoco_model.mujoco.mjtGeom
 ROOT = np.sqrt(0.5)

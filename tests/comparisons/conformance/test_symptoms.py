@@ -14,7 +14,7 @@ from dropspin.comparisons.conformance.probes import DT, PROBES
 from dropspin.comparisons.conformance.symptoms import symptoms
 from dropspin.comparisons.conformance.timing import NO_LAG
 from dropspin.comparisons.faults.mistakes import Mistake
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.scenarios import Trajectory, truth_for
 from dropspin.scenarios.rotations import cross, rotate, unrotate
 from dropspin.scenarios.state import POSITION, VELOCITY

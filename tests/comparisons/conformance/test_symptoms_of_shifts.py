@@ -6,7 +6,7 @@ from support import engines as made
 from support.bouncing import Bouncing, coulomb, with_restitution
 
 from dropspin.comparisons.conformance.checks import run_check
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.scenarios.rotations import cross, rotate
 from dropspin.scenarios.variations import changed
 

@@ -12,8 +12,8 @@ from dropspin.comparisons.diagnosis.answers import DECAY_TIME, Answer, Finding, 
 from dropspin.comparisons.diagnosis.landing import rest
 from dropspin.comparisons.diagnosis.remedies import answers_to
 from dropspin.comparisons.diagnosis.sliding import _of_short_slide
-from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis
+from dropspin.comparisons.diagnosis.xml_file import Setting
 from dropspin.reports.stories.diagnose import sentences
 
 BALL = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 1"/><body name="b" pos="0 0 1"><freejoint/>

@@ -12,7 +12,7 @@ from dropspin.comparisons.measuring.motion_quantities import Setup
 from dropspin.comparisons.sweeps.parts import run_jobs
 from dropspin.comparisons.sweeps.spec import load_sweep
 from dropspin.scenarios import Trajectory, truth_for
-from dropspin.scenarios.fields import with_fields
+from dropspin.scenarios.field_names import with_fields
 from dropspin.scenarios.variations import in_units
 
 V, W, C, K, DT = 5.0, 3.0, 0.999, 0.98, 0.015  # m/s, rad/s, factors of a step of DT

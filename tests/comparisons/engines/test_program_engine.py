@@ -15,8 +15,8 @@ from dropspin.comparisons.conformance.checks import run_check
 from dropspin.comparisons.engines import program_engine
 from dropspin.comparisons.engines.adapter_code import adapter_code
 from dropspin.comparisons.engines.program_engine import scene_lines
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, divergence, try_record
-from dropspin.comparisons.running.inputs import EngineEntry
 
 DOCS = Path(__file__).parents[3] / "docs"
 SPIN, TUMBLE = ds.load("fall-spin"), ds.load("drop-box-tumble")

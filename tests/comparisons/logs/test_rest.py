@@ -9,7 +9,7 @@ from support.tosses import BRICK, made
 from dropspin.comparisons.logs.flights import flights_of
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.log import Log, Toss
-from dropspin.comparisons.logs.other_readings import of_lengths, orders_of_axes
+from dropspin.comparisons.logs.other_conventions import of_lengths, orders_of_axes
 from dropspin.comparisons.logs.recording_faults import of_floor
 from dropspin.comparisons.logs.rest import Rests, level_share, rests
 from dropspin.scenarios.rotations import about, multiply, rotate

@@ -4,10 +4,10 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.engine_study import EngineStudy
 from dropspin.comparisons.running.forecast import MEASURING, Forecast, forecast, simulations
-from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.start_phases import StartPhase, phases_at

@@ -10,9 +10,9 @@ from support.cli import DROPSPIN
 
 import dropspin as ds
 from dropspin.comparisons.judging.convergence import Claim
+from dropspin.comparisons.running.arguments import MOST_ROWS
 from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.engine_run import EngineRun, motions_from
-from dropspin.comparisons.running.inputs import MOST_ROWS
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.start_phases import StartPhase, compare, measure

@@ -6,9 +6,9 @@ import pytest
 import dropspin as ds
 from dropspin.comparisons.measuring.batch_quantities import AT_ONCE, compute_states
 from dropspin.comparisons.measuring.state_quantities import States
+from dropspin.comparisons.running.arguments import MOST_ROWS, as_scene
 from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.engine_run import motions_from
-from dropspin.comparisons.running.inputs import MOST_ROWS, as_scene
 from dropspin.comparisons.running.perturbed_starts import PERTURBED_PHASES, changes_of_metrics, number_of_simulations
 from dropspin.comparisons.running.start_phases import START_PHASES, StartPhase, compare, number_of_phases, phases_at
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from dropspin.comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS, verify_time_step
+from dropspin.comparisons.running.arguments import FEWEST_STEPS, MOST_STEPS, verify_time_step
 from dropspin.scenarios import DropspinError, load
 
 BODY = {"shape": "sphere", "radius": 0.1, "mass": 1.0}

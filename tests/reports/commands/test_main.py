@@ -16,8 +16,8 @@ from support.cli import Started, dropspin, spawn
 
 import dropspin as ds
 from dropspin.comparisons.judging.verdicts import MARKS
+from dropspin.comparisons.limits import study
 from dropspin.comparisons.results.interrupts import INTERRUPTS
-from dropspin.comparisons.robustness import study
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ONE_MINUTE
 from dropspin.reports.commands import main as cli
 from dropspin.reports.commands.limits import limits_command

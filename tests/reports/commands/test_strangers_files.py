@@ -18,7 +18,7 @@ from dropspin.comparisons.sweeps.folder import read_sweep
 from dropspin.comparisons.sweeps.running import run_sweep
 from dropspin.comparisons.sweeps.spec import load_sweep
 from dropspin.comparisons.tradeoff.errors import Ladder
-from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff
+from dropspin.comparisons.tradeoff.pareto import CostPoint, TradeOff
 from dropspin.reports.run_folder import write_report
 from dropspin.reports.stories.tradeoff import TradeOffs
 from dropspin.scenarios import DropspinError, load

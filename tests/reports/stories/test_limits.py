@@ -8,9 +8,9 @@ from dataclasses import replace
 import pytest
 from support.cli import TERMINAL
 
-from dropspin.comparisons.robustness.axes import AXES
-from dropspin.comparisons.robustness.failure_modes import Diagnosis
-from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, ScanPoint
+from dropspin.comparisons.limits.axes import AXES
+from dropspin.comparisons.limits.failure_modes import Diagnosis
+from dropspin.comparisons.limits.study import AxisScan, RobustnessStudy, ScanPoint
 from dropspin.reports import plots
 from dropspin.reports.stories import limits
 from dropspin.reports.study_files import write_study

@@ -8,7 +8,7 @@ import pytest
 from support.cli import TERMINAL
 
 from dropspin.comparisons.tradeoff.errors import Ladder
-from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff
+from dropspin.comparisons.tradeoff.pareto import CostPoint, TradeOff
 from dropspin.reports.stories import tradeoff
 from dropspin.reports.study_files import write_study
 from dropspin.reports.terminal.rows import print_rows

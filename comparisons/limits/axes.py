@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dropspin.comparisons.engines.mapping import may_tumble
-from dropspin.comparisons.robustness import operating_point as to
-from dropspin.comparisons.robustness.operating_point import OperatingPoint
+from dropspin.comparisons.limits import operating_point as to
+from dropspin.comparisons.limits.operating_point import OperatingPoint
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.variations import changed, in_units, with_inertia_ratio, with_size

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from support.engines import Exact, ExactSimulation, FrozenSimulation
 
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.robustness.axes import AXES
-from dropspin.comparisons.robustness.failure_modes import SOUND, ExtendedMotion, clamped, diagnose, held_speeds
-from dropspin.comparisons.robustness.operating_point import OperatingPoint, in_nominal_units
-from dropspin.comparisons.robustness.runner import Runner
-from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, ScanPoint, find_limits, scan_axis
+from dropspin.comparisons.limits.axes import AXES
+from dropspin.comparisons.limits.failure_modes import SOUND, ExtendedMotion, clamped, diagnose, held_speeds
+from dropspin.comparisons.limits.operating_point import OperatingPoint, in_nominal_units
+from dropspin.comparisons.limits.runner import Runner
+from dropspin.comparisons.limits.study import AxisScan, RobustnessStudy, ScanPoint, find_limits, scan_axis
 from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses

@@ -7,9 +7,8 @@ from typing import cast
 
 import numpy as np
 
-from dropspin.comparisons.measuring.differences import differences
-from dropspin.comparisons.robustness.axes import Axis
-from dropspin.comparisons.robustness.failure_modes import (
+from dropspin.comparisons.limits.axes import Axis
+from dropspin.comparisons.limits.failure_modes import (
     SOUND,
     Diagnosis,
     ExtendedMotion,
@@ -19,9 +18,10 @@ from dropspin.comparisons.robustness.failure_modes import (
     held_speeds,
     worst,
 )
-from dropspin.comparisons.robustness.operating_point import OperatingPoint, in_nominal_units
+from dropspin.comparisons.limits.operating_point import OperatingPoint, in_nominal_units
+from dropspin.comparisons.measuring.differences import differences
+from dropspin.comparisons.running.arguments import MOST_ROWS, EngineEntry, ignore
 from dropspin.comparisons.running.driving import Breakdown, record, verify_accepted
-from dropspin.comparisons.running.inputs import MOST_ROWS, EngineEntry, ignore
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.start_phases import start_phases
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for

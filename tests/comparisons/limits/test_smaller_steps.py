@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.engines import Crashing, Declining, Exact, ExactSimulation, Frozen, turned_by
 
-from dropspin.comparisons.robustness.study import find_limits
+from dropspin.comparisons.limits.study import find_limits
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.scenarios import load
 

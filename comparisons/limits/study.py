@@ -13,12 +13,12 @@ from typing import Annotated
 from pydantic import Field, PlainSerializer, PlainValidator
 
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.robustness.axes import AXES, Axis
-from dropspin.comparisons.robustness.failure_modes import Diagnosis, FailureMode
-from dropspin.comparisons.robustness.operating_point import OperatingPoint
-from dropspin.comparisons.robustness.runner import MOST_STEPS_PER_START, Runner
+from dropspin.comparisons.limits.axes import AXES, Axis
+from dropspin.comparisons.limits.failure_modes import Diagnosis, FailureMode
+from dropspin.comparisons.limits.operating_point import OperatingPoint
+from dropspin.comparisons.limits.runner import MOST_STEPS_PER_START, Runner
+from dropspin.comparisons.running.arguments import MOST_STEPS, EngineEntry, SceneLike, as_scene, ignore, verify_time_step
 from dropspin.comparisons.running.engine_entries import engine_entries
-from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry, SceneLike, as_scene, ignore, verify_time_step
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses

@@ -43,18 +43,17 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         return [replace(blank, direction=way, detail=MOVES) for way in WAYS]
     end = body.settled[-1:]
     rests = [body.motions(end, dt, math.ceil(WATCHED / dt), -body.gravity * UP, floor=True)[0, -1] for dt in dts]
-    if any(_is_tipped(body, end[0], direction) for direction in WAYS.values()):
-        return [replace(blank, direction=way, detail=TIPS) for way in WAYS]
     least = float(np.nanmin([body.friction, body.friction_across]))
     longest = SLIDE**2 / (2.0 * LONGEST_SLIDE * body.gravity)  # the friction of the longest slide
     each = zip(WAYS.items(), (body.friction, max(least, longest)), strict=True)
-    stops = {way: _stops(body, dts, rests, direction, friction) for (way, direction), friction in each}
-    if not all(stops.values()):
-        return [replace(blank, direction=way, detail=TIPS) for way in WAYS]
-    answers = [judged(body, replace(blank, direction=way), dts, found, [exact] * len(dts)) for way, found in stops.items()]
-    if not math.isnan(body.friction_across):
+    answers = []
+    for (way, direction), friction in each:
+        found = [] if _is_tipped(body, end[0], direction) else _stops(body, dts, rests, direction, friction)
+        of_way = replace(blank, direction=way)
+        answers.append(judged(body, of_way, dts[: len(found)], found, [exact] * len(found)) if found else replace(of_way, detail=TIPS))
+    if not math.isnan(body.friction_across) and not answers[1].detail:
         turned = replace(blank, direction="45°", physical=math.nan)
-        return [answers[0], replace(turned, detail=long) if least < longest else replace(turned, measured=stops["45°"][0])]
+        return [answers[0], replace(turned, detail=long) if least < longest else replace(turned, measured=answers[1].measured)]
     if SLIDE / (body.friction * body.gravity) < LONG_SLIDE:
         answers = [_of_short_slide(one) for one in answers]
     return answers
@@ -68,7 +67,7 @@ def _of_short_slide(answer: Answer) -> Answer:
 
 
 def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direction: Array, friction: float) -> list[float]:
-    """The distances in which a body that slides in a direction stops [m], with this friction or more; empty if it tips or rolls."""
+    """The distances in which a body that slides in a direction stops [m], with this friction or more, down to a step at which it tips."""
     found = []
     for dt, rest in zip(dts, rests, strict=True):
         start = rest.copy()
@@ -76,7 +75,7 @@ def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direct
         steps = math.ceil((1.5 * SLIDE / (friction * body.gravity) + 0.1) / dt)
         states = body.motions(start[np.newaxis], dt, steps, -body.gravity * UP, floor=True)[0]
         if tilt(states) > UNTURNED:
-            return []
+            break
         foot = unrotate(start[ORIENTATION], -start[1] * UP)  # a point of the body below its centre, which sways less
         moved = states[-1, POSITION] - start[POSITION] + rotate(states[-1, ORIENTATION], foot) - rotate(start[ORIENTATION], foot)
         found.append(float(np.hypot(moved[0], moved[2])))  # friction that differs between directions turns the motion

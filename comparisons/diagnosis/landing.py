@@ -136,7 +136,8 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         return support
     noteworthy = _noteworthy(body)
     depth, speed, tips = _at_rest(body, dts[0])
-    depth_error, moving = abs(depth - body.rest_depth), 0.0 if tips and "wind" not in body.unknown else speed
+    rolls = tips and "wind" not in body.unknown and is_at_rest(body)
+    depth_error, moving = abs(depth - body.rest_depth), 0.0 if rolls else speed
     is_wrong = depth_error > noteworthy or moving > noteworthy
     finest_depth, finest_speed, _ = _at_rest(body, dts[-1]) if is_wrong else (depth, speed, tips)
     floats = body.margin > 0.0 and -depth > noteworthy

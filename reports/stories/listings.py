@@ -1,7 +1,5 @@
 """The output of `dropspin list`: the scenes, the engines or the metrics."""
 
-from collections.abc import Iterator
-
 from dropspin.reports.document import Rows
 from dropspin.scenarios.loading import load, names
 from dropspin.scenarios.problems import problems
@@ -25,17 +23,18 @@ def scene_rows() -> Rows:
     ]
 
 
-def engine_rows() -> Iterator[dict[str, str]]:
+def engine_rows() -> Rows:
     """The engines that can be chosen by name: whether they are installed, what they are or how to install them, and their options."""
     from dropspin.comparisons.engines.registry import absence, engine_names
     from dropspin.comparisons.engines.stand_in import StandIn
     from dropspin.comparisons.running.engine_entries import engine_entry
 
+    rows = []
     for name in engine_names():
         entry = engine_entry(name)
         if entry.engine is None:
             installed = "no" if entry.absence == "missing" else entry.absence
-            yield {"engine": name, "installed": installed, "summary": absence(name) or entry.reason, "options": ""}
+            rows.append({"engine": name, "installed": installed, "summary": absence(name) or entry.reason, "options": ""})
             continue
         adapter = entry.adapter
         choices = [f"{key} = {' | '.join(values)}" for key, values in adapter.choices.items()]
@@ -43,7 +42,8 @@ def engine_rows() -> Iterator[dict[str, str]]:
         settings = [f"{len(adapter.settings)} settings: dropspin show {name}"] if adapter.settings else []
         options = "; ".join(choices + numbers + settings)
         summary = adapter.traits.summary if isinstance(adapter, StandIn) else (type(adapter).__doc__ or "").strip().partition("\n")[0]
-        yield {"engine": name, "installed": "yes", "summary": summary, "options": options}
+        rows.append({"engine": name, "installed": "yes", "summary": summary, "options": options})
+    return rows
 
 
 def metric_rows() -> Rows:

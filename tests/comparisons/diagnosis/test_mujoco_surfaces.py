@@ -64,6 +64,16 @@ def test_capsule_is_put_down_where_a_wide_margin_begins(tmp_path):
     assert (depth.measured, drift.measured) == (pytest.approx(-1.0, abs=2e-3), pytest.approx(0.0, abs=1e-6))
 
 
+def test_box_that_rattles_for_ever_is_not_at_rest_although_it_tilts(tmp_path):
+    """MuJoCo's time constant is half of a time step: its bottom is between -5 and 1 mm."""
+    option = '<option timestep=".01"><flag refsafe="disable"/></option>'
+    geom = '<geom type="box" size=".1 .05 .03" mass="2" solref=".005 1"/>'
+    world = f'{FLOOR}<body name="b" pos="0 0 .5"><freejoint/>{geom}</body>'
+    (tmp_path / "model.xml").write_text(f"<mujoco>{option}<worldbody>{world}</worldbody></mujoco>")
+    body = MuJoCoModel(tmp_path / "model.xml", "model.xml").body("b", None)
+    assert [answer.quantity for answer, _ in findings_of(body, rest)] == ["drift speed"]
+
+
 def test_ball_rolls_on_when_its_table_ends(tmp_path):
     """MuJoCo's own keeps 0.82 on a wide table, and 0.998 in the flight after a narrow one."""
     ball = '<geom name="g" type="sphere" size=".03" condim="6" friction="1 .005 .001"/>'

@@ -158,7 +158,7 @@ def quoted_constants():
     from dropspin.comparisons.limits import runner
     from dropspin.comparisons.limits import study as limits
     from dropspin.comparisons.running.start_phases import START_PHASES
-    from dropspin.comparisons.tradeoff import costs, errors, points, study
+    from dropspin.comparisons.tradeoff import costs, errors, pareto, study
 
     ladder = [
         f"exceeds `--budget` ({errors.BUDGET:g} s)",
@@ -167,7 +167,7 @@ def quoted_constants():
     ]
     cost = [
         f"the median of {study.ROUNDS} rounds",
-        f"less than a factor of {points.LEVEL:g}",
+        f"less than a factor of {pareto.LEVEL:g}",
         f"in a batch of {costs.WORLDS[0]}",
         f"longer than {costs.LONGEST_BATCH:g} s",
     ]

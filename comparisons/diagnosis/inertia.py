@@ -56,30 +56,22 @@ def _impossible(body: LooseBody, given: MassProperties, solid: MassProperties | 
             )
             return
         quantity, possible = "second moments / largest possible", "at most 1 for this mass and shape"
+        unturned, turn = body.in_own_frame, body.in_file("turn")
+        is_turned = bool(turn) and unturned is not None and not np.allclose(unturned, given.inertia, atol=SMALL * largest)
+        if is_turned and unturned is not None and _excess(points, mean_squares(unturned, given.mass)) <= INERTIA_ROUNDING:
+            remedy = Remedy(f"a frame that is not turned: the file's moments are then {_components(unturned)}")
+            yield Answer(
+                "inertia", quantity, "1", measured=excess, physical=1.0, findings=(Finding("impossible", turn, (remedy,), possible),)
+            )
+            return
         if (factor := largest / largest_possible(given, points)) > INERTIA_ROUNDING:
             quantity, excess = "largest moment / largest possible", factor
     remedies: tuple[Remedy, ...] = ()
-    turn = body.in_file("turn")
-    if turn and solid is not None and quantity.startswith("second"):
-        unturned = _along(solid.inertia, given.inertia)
-        if _excess(points, mean_squares(unturned, given.mass)) <= INERTIA_ROUNDING:
-            remedies = (Remedy(f"a frame that is not turned, with {_components(unturned)}"),)
-            yield Answer(
-                "inertia", quantity, "1", measured=excess, physical=1.0, findings=(Finding("impossible", turn, remedies, possible),)
-            )
-            return
     if solid is not None:
         also = f", and its centre of mass, {displaced}" * (_excess(points, mean_squares(solid.inertia, solid.mass)) > INERTIA_ROUNDING)
         remedies = (Remedy(f"the inertia of a uniform solid, {_components(solid.inertia)}{also}"),)
     finding = Finding("impossible", ("inertia",), remedies, possible)
     yield Answer("inertia", quantity, "1", measured=excess, physical=float(least > 0.0), findings=(finding,))
-
-
-def _along(tensor: Array, other: Array) -> Array:
-    """The tensor with the principal moments of another one, shape (3, 3)."""
-    axes = np.linalg.eigh(tensor)[1]
-    found: Array = axes @ np.diag(np.linalg.eigvalsh(other)) @ axes.T
-    return found
 
 
 def _excess(points: Array, squares: Array) -> float:

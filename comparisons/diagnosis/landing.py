@@ -136,8 +136,7 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         return support
     noteworthy = _noteworthy(body)
     depth, speed, tips = _at_rest(body, dts[0])
-    rolls = tips and "wind" not in body.unknown and is_at_rest(body)
-    depth_error, moving = abs(depth - body.rest_depth), 0.0 if rolls else speed
+    depth_error, moving = abs(depth - body.rest_depth), 0.0 if tips and "wind" not in body.unknown else speed
     is_wrong = depth_error > noteworthy or moving > noteworthy
     finest_depth, finest_speed, _ = _at_rest(body, dts[-1]) if is_wrong else (depth, speed, tips)
     floats = body.margin > 0.0 and -depth > noteworthy
@@ -168,11 +167,16 @@ def _of_error(body: LooseBody, error: float, finest: float, noteworthy: float) -
 
 
 def _at_rest(body: LooseBody, dt: float) -> tuple[float, float, bool]:
-    """The mean depth [m] and the speed [m/s] of a body that was put down, in the last half second, and whether it tips or rolls."""
+    """The mean depth [m] and the speed [m/s] of a body that was put down, in the last half second, and whether it tips or rolls.
+
+    One that tilts and leaves the surface jumps.
+    """
     states = body.settled if dt == body.dt else body.put_down(dt)
     last = states[-math.ceil(0.5 / dt) :]
     speed = float(np.linalg.norm(np.ptp(last[:, POSITION], axis=0))) / 0.5
-    return -float(body.lowest(last).mean()), speed, tilt(states) > UNTURNED
+    heights = body.lowest(last)
+    stays = bool(heights.max() <= body.margin + 0.1 * _noteworthy(body))
+    return -float(heights.mean()), speed, stays and tilt(states) > UNTURNED
 
 
 def is_at_rest(body: LooseBody) -> bool:

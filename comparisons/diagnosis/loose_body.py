@@ -22,6 +22,8 @@ SETTLED = 3.0  # s
 STILL = np.zeros(3)
 ALONG = 1e-9  # angle of a torque to an axis, below which it is along it [rad]
 ROUNDING = 1e-14  # of products of inertia, relative to the moments, and of components, relative to the largest
+LIGHT = 0.01
+"""Share of the mass that may be in parts without geometry where the geometries are said to contain it."""
 Changes = Mapping[str, str | float | tuple[float, ...]]
 """Settings to change, by name: those of `LooseBody.remedies`."""
 
@@ -67,7 +69,7 @@ class LooseBody(ABC):
         inertia: About the centre of mass, in the body frame [kg m²], shape (3, 3).
         offset: The centre of mass in the frame that damping and armature act on [m], shape (3,).
         parts: The geometries, visual ones included.
-        is_bounded: Whether everything with mass has geometries, inside of which the mass is.
+        is_bounded: Whether everything has geometries, inside of which the mass is, but for at most `LIGHT` of the mass.
         pose: The orientation of the body in the file, shape (4,).
         resistance: The damping, a function of velocity and spin.
         falls: The damping of a fall.
@@ -84,6 +86,7 @@ class LooseBody(ABC):
         rolling: Whether friction resists rolling.
         rest_depth: Depth of a body at rest below the surface by the contact settings [m], negative above; NaN if it has no closed form.
         written: The mass and inertia that the file has; None if it has no inertia.
+        in_own_frame: The inertia that the file has about the axes of its own frame, shape (3, 3); None of several links.
         settings: Where settings that matter are written, by the engine's names.
         ignored: What the engine read and does not use, or changes: name, what is written, what is in force.
         unmodelled: What the file has beside the body that the simulations leave out.
@@ -119,6 +122,7 @@ class LooseBody(ABC):
     rolling: bool
     rest_depth: float
     written: MassProperties | None
+    in_own_frame: Array | None = None
     settings: Mapping[str, Setting]
     ignored: Sequence[Ignored]
     unmodelled: Sequence[str]

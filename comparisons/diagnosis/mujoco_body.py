@@ -10,7 +10,7 @@ import numpy as np
 from mujoco import rollout
 
 from dropspin.comparisons.diagnosis.geometries import Part, at_point, lowest_of
-from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, LooseBody
+from dropspin.comparisons.diagnosis.loose_body import LIGHT, Changes, Drag, LooseBody
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
 from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of
@@ -59,7 +59,6 @@ REMEDIES: Mapping[str, Changes] = {
     "sleep_tolerance": {"sleep_tolerance": 0.0},
     "solref": DEFAULT_CONTACT,
     "solimp": DEFAULT_CONTACT,
-    **dict.fromkeys(SOLVED, SOLVED),
 }
 
 ROUGH = 2.0
@@ -89,7 +88,7 @@ class MuJoCoBody(LooseBody):
     """
 
     def __init__(self, name: str, alone: MuJoCoAlone) -> None:
-        file, self._alone, self._file, self.remedies = alone.file, alone, alone.file, REMEDIES
+        file, self._alone, self._file = alone.file, alone, alone.file
         self.name, self.engine, self.version = name, "MuJoCo", mujoco.__version__
         self.dt, self.gravity = file.model.opt.timestep, float(np.linalg.norm(file.gravity))
         self._model = alone.model(self.dt, np.zeros(3), floor=False)
@@ -98,7 +97,8 @@ class MuJoCoBody(LooseBody):
         self.mass, self.offset, self.inertia = found
         self.pose = multiply(alone.level, np.roll(file.data.xquat[alone.head], -1))
         self.parts = list(self._parts())
-        self.is_bounded = set(np.flatnonzero(self._model.body_mass)) <= {*self._model.geom_bodyid}
+        bare = np.setdiff1d(np.arange(self._model.nbody), self._model.geom_bodyid)
+        self.is_bounded = bool(self._model.body_mass[bare].sum() <= LIGHT * self.mass)
         self.falls, self.resistance, self.armature = Drag(*alone.damping), joint_damping(*alone.damping), alone.armature
         self.spins = [self.falls] * 3
         # The share of the weight that `gravcomp` of the body and of what is welded to it takes away.
@@ -109,13 +109,14 @@ class MuJoCoBody(LooseBody):
         self.unknown = [name for name, acts in unmodelled.items() if acts]
         self._touching = {geom: alone.in_force_of(geom) for geom in self._lowest}
         self._text = BodyText(alone, self._touching)
-        self.written, self.settings = self._text.written, self._text.settings
+        self.written, self.in_own_frame, self.settings = self._text.written, self._text.in_own_frame, self._text.settings
         self._land()
         contact, sleep = self.in_file(*DEFAULT_CONTACT), ("sleep_tolerance",) * sleeps(option)
         softens = ("cone",) * (option.cone != ELLIPTIC and self.friction >= ROUGH)
         is_early = option.iterations < 100, option.ls_iterations < 50, option.tolerance > 1e-8
         ends = [name for name, early in zip(SOLVED, is_early, strict=True) if early]
         of_contact = {"slide": (*ends, *contact), "roll": (*ends, *contact), "impact": (*ends, *softens), "rest": (*ends, *softens)}
+        self.remedies = {**REMEDIES, **{name: {end: SOLVED[end] for end in ends} for name in ends}}
         self.causes = {question: (*sleep, *acting, *of_contact.get(question, ())) for question, acting in CAUSES.items()}
 
     def changed(self, changes: Changes) -> LooseBody:

@@ -52,7 +52,7 @@ class BodyText:
     @cached_property
     def written(self) -> MassProperties | None:
         """What the file says of the body and of what is welded to it, with moments that MuJoCo would balance as they are written."""
-        tensor = self._tensor
+        tensor = self.in_own_frame
         found = self.unchanged
         if found is None or tensor is None:
             return found
@@ -69,7 +69,7 @@ class BodyText:
         return None if compiled is None else mass_properties(*compiled, self.group)
 
     @cached_property
-    def _tensor(self) -> Array | None:
+    def in_own_frame(self) -> Array | None:
         """The tensor that is written for a body to which nothing is welded, about the axes of its inertial frame."""
         inertial = None if self.element is None else next(iter(children_of(self.element, "inertial")), None)
         if inertial is None or len(self.group) > 1:

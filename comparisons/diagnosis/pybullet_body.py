@@ -14,7 +14,7 @@ import pybullet_data  # type: ignore[import-untyped]
 
 from dropspin.comparisons.diagnosis.geometries import Part, at_point, lowest_of
 from dropspin.comparisons.diagnosis.inertia import inertia
-from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, LooseBody, MassProperties
+from dropspin.comparisons.diagnosis.loose_body import LIGHT, Changes, Drag, LooseBody, MassProperties
 from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Link, read_links
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
 from dropspin.comparisons.diagnosis.urdf_file import UrdfFile, package_remedy
@@ -189,7 +189,8 @@ class PyBulletBody(LooseBody):
         is_hard = all(link.dynamics[9] < 0.0 for link in touching)  # a spring and damper have no restitution
         is_held = any(part.collides for part in parts)
         self.parts, self.surface = parts, SURFACE if is_held else ""
-        self.is_bounded = all(link.geometry or [*link.element.every("visual")] for link in self._links if link.mass)
+        bare = [link.mass for link in self._links if not link.geometry and next(link.element.every("visual"), None) is None]
+        self.is_bounded = sum(bare) <= LIGHT * mass
         self.missed = f"{SURFACE}: its collision group and mask exclude static bodies" if parts and not is_held else ""
         self.friction = touching[0].dynamics[1] * plane[1] if len(frictions) == 1 else math.nan
         self.restitution = touching[0].restitution * plane[5] if is_hard and len(restitutions) == 1 else None
@@ -197,6 +198,7 @@ class PyBulletBody(LooseBody):
         self.rolling = any(link.dynamics[6] > 0.0 for link in touching)
         self.rest_depth = SLOP - self.margin if is_hard else math.nan
         self.written = None if written is None or len(self._links) > 1 else MassProperties(mass, np.zeros(3), written)
+        self.in_own_frame = None if self.written is None else self._links[0].in_own_frame
         self.settings, self.ignored = self._settings(touching[0]), self._ignored(plane[5])
         self.unmodelled = ["joints"] if len(self._model.heads) > 1 else []
         if not parts or any(answer.findings for answer in inertia(self)):

@@ -65,10 +65,13 @@ class Link(NamedTuple):
     @property
     def written(self) -> Array | None:
         """The inertia that the file has [kg m²], shape (3, 3); None if it has none."""
+        return None if self.in_own_frame is None else self._turned(self.in_own_frame)
+
+    @property
+    def in_own_frame(self) -> Array | None:
+        """The same about the axes of its own frame."""
         element = next(self.element.every("inertia"), None)
-        if element is None:
-            return None
-        return self._turned(np.array(symmetric([element.number(name, 0.0) for name in OF_URDF])))
+        return None if element is None else np.array(symmetric([element.number(name, 0.0) for name in OF_URDF]))
 
     @property
     def collides(self) -> bool:

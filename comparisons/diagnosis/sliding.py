@@ -25,7 +25,7 @@ MARGINAL = 1.01
 """Ratio of the two levers up to which a body, such as a cube with a coefficient of friction of 1, is not said to tip."""
 LEANING = np.array([0.0, 0.01, 0.0101])
 """Angles by which the lever of the weight about the leading edge is found [rad]; an uneven load tilts a body at rest by less."""
-EDGES = np.radians(np.arange(-80.0, 80.1, 0.25))
+EDGES = np.radians(np.arange(-80.0, 81.0))
 """Directions from that of a slide to the normals of edges about which the body may turn [rad]."""
 WAYS = {"0°": np.array([1.0, 0.0, 0.0]), "45°": math.sqrt(0.5) * np.array([1.0, 0.0, 1.0])}
 """Directions of a slide, by their angle to an axis of the surface."""

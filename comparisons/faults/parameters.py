@@ -9,7 +9,7 @@ import numpy as np
 from dropspin.comparisons.faults.conventions import CONVENTIONS
 from dropspin.comparisons.faults.fault_model import FaultModel, Simulated, changed_table
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.bodies import Box, Ellipsoid, Vertices
+from dropspin.scenarios.bodies import Box, Ellipsoid
 from dropspin.scenarios.bodies.inertia import in_numbers, principal_axes
 from dropspin.scenarios.bodies.shape import times
 from dropspin.scenarios.model import Gravity
@@ -61,11 +61,6 @@ def _of_one_kilogram(scene: Scenario) -> Scenario:
     masses = getattr(scene.body, "masses", None)
     parts = {} if masses is None else {"masses": times(1.0 / scene.body.mass, masses)}
     return with_values(scene, "body", mass=1.0, **parts)
-
-
-def _as_a_solid(scene: Scenario) -> Scenario:
-    """Points without faces have no solid."""
-    return scene if isinstance(scene.body, Vertices) else with_values(scene, "body", inertia="solid")
 
 
 def _friction(change: Callable[[float], float]) -> Simulated:
@@ -125,7 +120,7 @@ PARAMETERS: dict[str, dict[str, Simulated]] = {
         "inertia is half as large, relative to the mass": _scaled_inertia(lambda mass: 0.5),
         "inertia is multiplied by the mass": _scaled_inertia(lambda mass: mass),
         "inertia is divided by the mass": _scaled_inertia(lambda mass: 1.0 / mass),
-        "inertia is that of the solid shape for every scene": _as_a_solid,
+        "inertia is that of the solid shape for every scene": changed_table("body", inertia="solid"),
     },
     "floor": {"the body falls through the floor": lambda scene: scene.model_copy(update={"floor": None})},
     "restitution": {

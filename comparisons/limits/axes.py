@@ -1,4 +1,4 @@
-"""The axes of a robustness study. Each axis varies one quantity of the scene, or the time step, up to extreme values.
+"""The axes of a study of limits. Each axis varies one quantity of the scene, or the time step, up to extreme values.
 
 First come the values of axes: the initial ones of a scan, and the midpoint of two of them, for bisection.
 """

@@ -25,6 +25,8 @@ RESTS_NEAR = 0.04
 """Of the size of the body: how far above or below the floor it may rest, by errors of its own size and of tags."""
 BAD_FRAMES = (1, 2, 3)
 """Numbers of bad frames that are tried."""
+CLEAR = 20.0
+"""Turn or way of a flight, over the noise, from which the ratio of its recorded rates to those of the motion is known."""
 DEGREE, BETTER = 5, 1.02
 """Degree of the polynomials that compare times with equal steps. Uneven times are right unless equal steps fit by this factor better."""
 
@@ -47,13 +49,21 @@ def _rated(flights: Flights) -> tuple[_Rated, _Rated]:
 
 
 def ratios_of_rates(flights: Flights) -> Iterator[tuple[str, float, float, float]]:
-    """Names of recorded rates, and their ratio to those of the motion with its interval, which needs `FEWEST` flights."""
-    for name, columns in zip(("spin over that of the orientations", "velocity over that of the positions"), _rated(flights), strict=True):
-        known = [(given[flight.rows], exact) for flight, given, exact in columns if given is not None and exact.any()]
-        if known:
-            ratios = np.array([[np.sum(given * exact) / np.sum(exact**2)] for given, exact in known])
-            (low,), (high,) = intervals_of_means(ratios)
-            yield name, float(ratios.mean()), float(low), float(high)
+    """Names of recorded rates, and their ratio to those of the motion with its interval, which needs `FEWEST` flights.
+
+    Flights that hardly turn, or move, are left out.
+    """
+    names, noises = (
+        ("spin over that of the orientations", "velocity over that of the positions"),
+        (flights.turning.noise, flights.moving.noise),
+    )
+    for name, columns, noise in zip(names, _rated(flights), noises, strict=True):
+        known = [(flight, given[flight.rows], exact) for flight, given, exact in columns if given is not None]
+        clear = [row for row in known if np.median(length(row[2])) * row[0].duration > CLEAR * noise.white]
+        ratios = np.array([[np.sum(given * exact) / np.sum(exact**2)] for _, given, exact in clear if exact.any()])
+        (low,), (high,) = intervals_of_means(ratios.reshape(-1, 1))
+        if len(ratios):  # of ratios that hardly differ, those of the flights bound the mean
+            yield name, float(ratios.mean()), float(max(low, ratios.min())), float(min(high, ratios.max()))
 
 
 def _velocities(flight: Flight, spins: Array, header: Header) -> Array:
@@ -110,7 +120,7 @@ def _of_column(
         for in_frame, rates in zip(frames, (rotate(upright, columns_read), rotate(turned, columns_read)), strict=True):
             factor = float(np.sum(rates * exact)) / (float(np.sum(exact**2)) or 1.0)
             is_scaled = abs(abs(factor) - 1.0) > ALLOWED
-            if factor != 0.0 and explained(rates, factor):
+            if (factor > 0.0 or (factor < 0.0 and not axis)) and explained(rates, factor):
                 in_degrees = kind == "spin" and abs(math.radians(abs(factor)) - 1.0) < ALLOWED
                 unit = Cause("degrees" if in_degrees else f"unit of the {kind}", abs(factor) - 1.0)
                 mirror = [Cause(f"mirror {axis}")] if axis else []
@@ -193,7 +203,7 @@ def _continued(flight: Flight, shared: Array, t: Array, orientation: Array) -> A
 def _in_mid_air(flights: Flights) -> dict[str, float]:
     """How high the flights end that would not be near the floor three frames after their last one [m], by the name of the toss.
 
-    None if these are more than half of the flights: the floor is elsewhere then.
+    Empty if these are more than half of the flights: the floor is elsewhere then.
     """
     header, found = flights.log.header, {}
     for rotor in flights.rotations if header.floor is not None else ():

@@ -265,7 +265,7 @@ class Comparison:
 
     @cached_property
     def struck_point(self) -> Array:
-        """The contact point at the last row before the first contact [m], shape (3,).
+        """The vector from the centre of mass to the contact point at the last row before the first contact [m], shape (3,).
 
         Raises:
             Unresolved: There is no contact.
@@ -275,7 +275,7 @@ class Comparison:
         return self.contact_point(self.first_contact[0])
 
     def normal_velocity_of_struck_point(self, row: int) -> float:
-        """Vertical velocity of the point with this vector at a row [m/s]."""
+        """Vertical velocity at a row of the point at `struck_point` [m/s]."""
         return float((self.motion.velocity[row] + cross(self.motion.angular_velocity[row], self.struck_point))[1])
 
     @cached_property

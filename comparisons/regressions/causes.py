@@ -91,7 +91,7 @@ def causes(results: Results, engine: str) -> Causes:
     faults: dict[object, FaultModel] = {}  # the first one of those that are the same in all of these scenes
     for fault in FAULT_MODELS:
         if fault.about != "start" and holds(fault):
-            faults.setdefault((fault.reported, *(fault.simulated(scene) for scene, _ in scenes)), fault)
+            faults.setdefault((fault.reported, *(_simulated(fault, scene) for scene, _ in scenes)), fault)
     return Causes(parameters, list(faults.values()))
 
 
@@ -159,14 +159,20 @@ class _Caused(NamedTuple):
     is_whole: bool = False
 
 
+def _simulated(fault: FaultModel, scene: Scenario) -> Scenario | None:
+    """The scene that a fault simulates instead; None if its body is impossible."""
+    try:
+        return fault.simulated(scene)
+    except (DropspinError, ValueError):
+        return None
+
+
 def _caused(scene: Scenario, fault: FaultModel, dt: float, start: float = 0.0) -> _Caused:
     """The errors that a cause has, sampled from a start within the first step; NaN without an exact solution."""
     step = max(dt, scene.duration / MOST_STEPS)
     count = (1 if start == 0.0 else 0) + scene.steps(step)
-    try:
-        reference, motion = _sampled(scene, step, count, start), _exact(fault.simulated(scene), step, count, start)
-    except (DropspinError, ValueError):  # the body is impossible
-        return _Caused()
+    simulated, reference = _simulated(fault, scene), _sampled(scene, step, count, start)
+    motion = None if simulated is None else _exact(simulated, step, count, start)
     if reference is None or motion is None:
         return _Caused()
     exact, errors = reference

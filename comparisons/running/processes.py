@@ -103,8 +103,7 @@ class EngineProcesses:
             if self._closed:
                 raise Closed
             if self._has_exited(entry.label) and not finished([task], GRACE):
-                self.renew(entry)
-                return Breakdown("crashed", "its process exited with code 0 before the work was done")
+                return self._of_exit(entry)
             if self._shared[entry.label][0]:
                 start = min(start, time.monotonic())  # of a clock that nobody sets
             if time.monotonic() - start > WALL_TIME_FACTOR * allowed:
@@ -127,6 +126,13 @@ class EngineProcesses:
             return Breakdown("crashed", f"its result cannot be returned: {described(error)}")
         vars(task)["_result"] = None  # pebble keeps the last task of each process, and with it many motions
         return result
+
+    def _of_exit(self, entry: EngineEntry) -> Breakdown:
+        """The breakdown of a process that exited before its work was done, unless the work was abandoned."""
+        if self._closed:
+            raise Closed
+        self.renew(entry)
+        return Breakdown("crashed", "its process exited with code 0 before the work was done")
 
     def _ready(self, entry: EngineEntry) -> ProcessPool:
         """The pool of an engine's process, with another process if the engine broke the one of its last work."""

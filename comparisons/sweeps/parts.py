@@ -100,7 +100,7 @@ class Work:
         Args:
             part: The numbers of its jobs.
             processes: The engines' processes.
-            verify_running: Called before each job or group of jobs, and after one that failed; raises if the sweep has ended.
+            verify_running: Called before each job or group of jobs, and after one that failed; raises if the worker of a cluster closes.
         """
         groups = self.sweep.jobs(part.start, part.stop)
         return pa.concat_tables([_as_table(self.sweep, jobs, self._outcomes(jobs, processes, verify_running)) for jobs in groups])

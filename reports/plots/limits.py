@@ -31,7 +31,7 @@ BAR = 10.0  # points
 
 
 def failure_modes(found: RobustnessStudy, axis_name: str) -> Chart:
-    """The failure mode of each engine along an axis of a robustness study; a dotted line marks the nominal value of the scene.
+    """The failure mode of each engine along an axis of a study of limits; a dotted line marks the nominal value of the scene.
 
     Args:
         found: The study.

@@ -20,7 +20,8 @@ def error_budgets(results: Results) -> list[dict[Hashable, Any]]:
     """The errors of a run of one scene at the finest time step, by metric, for engines that ran at enough time steps.
 
     Negligible errors that vanish as dt → 0 are left out. A row has the columns of the error, of its asymptotic error (names that end in
-    `_of_limit`) and of its order (`_of_order`), which are NaN if undefined; the cause to which the error is attributed; and a sentence.
+    `_of_limit`) and of its order (`_of_order`), which are NaN if undefined; the cause to which the error is attributed; whether it is
+    undecided; and a sentence.
     """
     table, pair = results.table, ["metric", "engine"]
     errors = table.assign(undecided=results.undecided.groupby([table[name] for name in pair]).transform("any"))

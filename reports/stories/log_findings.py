@@ -55,7 +55,8 @@ def corrections(recording: str, findings: Iterable[Finding]) -> list[str]:
         )
     cut = [finding for finding in findings if finding.kind in ("frame dropped", "bad frame", "mid-air")]
     if cut:
-        sentences.append(f"Flights that end before the body reaches the floor: {len(cut)}. {sentence(cut[0])}")
+        tosses = len({finding.toss for finding in cut})
+        sentences.append(f"Tosses of which a part is used, because frames are missing or wrong: {tosses}. {sentence(cut[0])}")
     return sentences
 
 

@@ -205,6 +205,11 @@ def test_box_that_tips_over_its_long_edge_at_45_degrees_has_no_stopping_distance
         assert [answer.detail == TIPS for answer in slide(body, ladder(body))] == [False, tips]
 
 
+def test_box_that_tilts_at_finer_steps_than_that_of_the_file_has_a_distance(tmp_path):
+    body = body_of(tmp_path, FREE.format('<geom type="box" size=".1 .05 .03" mass="2"/>'), 'timestep=".05"')
+    assert [answer.detail for answer in slide(body, ladder(body))] == ["", ""]
+
+
 def test_body_that_an_uneven_load_tilts_at_rest_slides(tmp_path):
     """By 0.5 mrad on a soft surface, backwards; µ times its height is 25 mm, the lever about its leading edge 250 mm."""
     block = '<inertial pos="-.1 0 .005" mass="1" diaginertia=".01 .01 .01"/><geom type="box" size=".15 .1 .02"/>'

@@ -474,7 +474,24 @@ def test_frame_of_an_inertia_that_is_turned_by_mistake_is_named(tmp_path):
     [answer] = impossible(body_of(tmp_path, FREE.format(inertial), head='<compiler angle="radian"/>'))
     [found] = answer.findings
     assert found.settings == ("turn",)
-    assert found.remedies[0].text.startswith("a frame that is not turned, with ixx, iyy, izz = 0.00227, 0.00727, 0.00833 kg m²")
+    assert found.remedies[0].text.startswith(
+        "a frame that is not turned: the file's moments are then ixx, iyy, izz = 0.00227, 0.00727, 0.00833 kg m²"
+    )
+
+
+def test_moments_in_a_wrong_order_are_not_blamed_on_a_frame_that_is_not_turned(tmp_path):
+    moments = 2.0 / 3.0 * np.array([0.1**2 + 0.05**2, 0.1**2 + 0.03**2, 0.05**2 + 0.03**2])  # of z, y and x
+    inertial = f'<inertial pos="0 0 0" quat="1 0 0 0" mass="2" diaginertia="{numbers(moments)}"/><geom type="box" size=".1 .05 .03"/>'
+    [answer] = impossible(body_of(tmp_path, FREE.format(inertial)))
+    assert answer.findings[0].settings == ("inertia",)
+
+
+def test_light_part_without_geometry_leaves_the_shape_to_bound_the_inertia(tmp_path):
+    sensor = '<body pos="0 0 .04"><inertial pos="0 0 0" mass=".001" diaginertia="1e-7 1e-7 1e-7"/></body>'
+    heavy = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><geom type="box" size=".1 .05 .03"/>'
+    assert [answer.quantity for answer in impossible(body_of(tmp_path, FREE.format(heavy + sensor)))] == [
+        "largest moment / largest possible"
+    ]
 
 
 @pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass' is deprecated")

@@ -74,6 +74,12 @@ def test_box_that_rattles_for_ever_is_not_at_rest_although_it_tilts(tmp_path):
     assert [answer.quantity for answer, _ in findings_of(body, rest)] == ["drift speed"]
 
 
+def test_egg_that_rocks_is_no_error(tmp_path):
+    """Put down at 40°, it turns to and fro for long, and its centre rises and falls."""
+    egg = '<geom type="ellipsoid" size=".05 .05 .1" euler="40 0 0"/>'
+    assert findings_of(on(tmp_path, FLOOR, geom=egg), rest) == []
+
+
 def test_ball_rolls_on_when_its_table_ends(tmp_path):
     """MuJoCo's own keeps 0.82 on a wide table, and 0.998 in the flight after a narrow one."""
     ball = '<geom name="g" type="sphere" size=".03" condim="6" friction="1 .005 .001"/>'

@@ -226,7 +226,7 @@ def test_missing_frames_are_named_with_their_place(count: int) -> None:
     shorter = replace(toss, t=toss.t[:-count], position=toss.position[kept], orientation=toss.orientation[kept])
     found = only(log_check(replace(log, tosses=(*log.tosses[:3], shorter, *log.tosses[4:]))))
     assert (found.kind, found.toss, found.value, found.frame) == ("frame dropped", "3", count, 30)
-    assert "floor: 1. Toss 3: number of frames missing before frame 30" in corrections("toss.toml", [found])[0]
+    assert "wrong: 1. Toss 3: number of frames missing before frame 30" in corrections("toss.toml", [found])[0]
 
 
 def test_a_flight_that_ends_above_the_floor_is_named_unless_most_do() -> None:

@@ -18,7 +18,7 @@ from dropspin.reports.markdown import markdown
 from dropspin.reports.stories.check import document
 from dropspin.reports.stories.failures import failure_parts, failures
 from dropspin.reports.terminal.rows import print_document
-from dropspin.scenarios import DropspinError, Scenario, load
+from dropspin.scenarios import DropspinError, load
 from dropspin.scenarios.rotations import about, rotate
 from dropspin.scenarios.variations import with_values
 
@@ -221,7 +221,14 @@ def test_changes_of_mass_and_of_size_keep_the_products_of_inertia():
     np.testing.assert_array_equal(without(scene).body.inertia_tensor, 0.004 * np.eye(3))
 
 
-@pytest.mark.parametrize("number", range(1, 16))
-def test_faults_of_engines_can_be_simulated_in_random_scenes_of_every_family(number):
-    scene = load(f"draw-5-{number}")
-    assert {type(fault.simulated(scene)) for fault in mistakes.FAULT_MODELS} == {Scenario}
+def test_fault_is_found_beside_a_body_for_which_it_is_impossible():
+    """A body with a displaced centre of mass cannot be a uniform solid."""
+    body = {"shape": "box", "mass": 2.0, "half_extents": [0.05, 0.03, 0.02], "inertia": [0.002, 0.003, 0.004]}
+    spin = {"duration": 0.5, "start": {"angular_velocity": [0.5, 5.0, 1.0]}}
+    displaced = load({"name": "displaced", **spin, "body": {**body, "center_of_mass": [0.0, 0.0, 0.004]}})
+
+    def as_solid(scene):
+        return scene if any(scene.body.center_of_mass) else with_values(scene, "body", inertia="solid")
+
+    results = run([load({"name": "plain", **spin, "body": body}), displaced], Made(title="solid", change=as_solid), STEPS)
+    assert "inertia is that of the solid shape for every scene" in [fault.message for fault in causes(results, "solid").faults]

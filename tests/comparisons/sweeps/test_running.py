@@ -204,8 +204,8 @@ def test_resuming_runs_only_the_missing_parts(tmp_path):
     assert_same(tmp_path / "out", tmp_path / "whole")
 
 
-def test_process_that_ends_with_its_sweep_is_not_a_failure():
-    """A job whose process ended because the sweep is being stopped has no row; it is run when the sweep is resumed."""
+def test_process_that_ends_with_the_worker_of_a_cluster_is_not_a_failure():
+    """A job whose process ended because the worker closes has no row; another worker runs it."""
     calls = []
 
     class Ending:

@@ -21,9 +21,9 @@ RATE = Cause("rate", -0.0111, {"rate": 149.7})
         ),
         (
             Finding("scale", 9.594, 9.81, causes=(LENGTH, Cause("rate", -0.0111))),
-            "Gravity is 9.594 m/s² instead of 9.81: either lengths are 2.2 % short, or the rate is 1.1 % low. To distinguish: measure "
-            "the height at rest on a known face, or the rate of the camera with a clock in the picture. Remedy: length_scale = 0.978, or "
-            "multiply the times t by 0.9889.",
+            "Gravity is 9.594 m/s² instead of 9.81: either lengths are 2.2 % short, or the rate is 1.1 % low. To distinguish: compare "
+            "the rate of the camera with a clock in the picture, and the height at rest on a known face with the true one. Remedy: "
+            "length_scale = 0.978, or multiply the times t by 0.9889.",
         ),
         (
             Finding("unit", 386.2, 9.81, causes=(Cause("length unit", keys={"length_unit": "inch"}),)),
@@ -32,7 +32,7 @@ RATE = Cause("rate", -0.0111, {"rate": 149.7})
         (
             Finding("unit", 39.2, 9.81, causes=(Cause("length scale", 3.0, {"length_scale": 4.0}), Cause("rate", 1.0, {"rate": 74.0}))),
             "Gravity is 39.2 m/s² instead of 9.81: either lengths are 4 times the true ones, or the rate is 2 times the true one. "
-            "To distinguish: compare a length in the recording with the true one, and the rate with a clock in the picture. Remedy: "
+            "To distinguish: compare the rate with a clock in the picture, and a length in the recording with the true one. Remedy: "
             "length_scale = 4, or rate = 74.",
         ),
         (

@@ -80,10 +80,10 @@ class Setup:
     @classmethod
     def of_starts(cls, scenes: Sequence[Scenario]) -> "Setup":
         """The setups of scenes that differ in their starts alone."""
-        setup, body = cls.of(scenes[0]), scenes[0].body
+        setup, body, states = cls.of(scenes[0]), scenes[0].body, initial_states(scenes)
         arrays: dict[str, Any] = {name: value[np.newaxis] for name, value in vars(setup).items() if isinstance(value, np.ndarray)}
         arrays["origin"] = np.array([energy_origin(scene) for scene in scenes])
-        arrays["clearance"] = clearances(initial_states(scenes), body.vertices, body.semi_axes)
+        arrays["clearance"] = clearances(states, body.vertices, body.semi_axes)
         return replace(setup, **arrays)
 
     @cached_property

@@ -1,7 +1,8 @@
 """A free body of a file that MuJoCo compiles, simulated alone, with the values that the compiled model has."""
 
 import math
-from collections.abc import Iterator, Mapping
+import operator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -20,7 +21,7 @@ from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.mujoco_model import contact
-from dropspin.comparisons.engines.mujoco_settings import CONTACT
+from dropspin.comparisons.engines.mujoco_settings import CONTACT, OPTION
 from dropspin.comparisons.engines.mujoco_simulation import from_world, full_state, quiet, to_world
 from dropspin.comparisons.engines.options import spelled
 from dropspin.scenarios.rotations import multiply, rotate
@@ -42,8 +43,8 @@ LEVEL = 0.1
 DEFAULT_CONTACT: Changes = {name: spelled(CONTACT[name].default) for name in ("solref", "solimp")}
 NO_FLUID: Changes = {"density": 0.0, "viscosity": 0.0}
 
-SOLVED: Changes = {"iterations": 100, "ls_iterations": 50, "tolerance": 1e-8}
-"""Where MuJoCo's solver ends by default; with fewer iterations or a larger tolerance, it may end too early."""
+ENDS: Mapping[str, Callable[[Any, Any], bool]] = {"iterations": operator.lt, "ls_iterations": operator.lt, "tolerance": operator.gt}
+"""Where MuJoCo's solver ends, and how a value compares with the default if the solver may end too early."""
 REMEDIES: Mapping[str, Changes] = {
     "damping": {"damping": 0.0, "armature": 0.0, "frictionloss": 0.0},  # a <freejoint/> has none of these
     "armature": {"armature": 0.0},
@@ -113,10 +114,9 @@ class MuJoCoBody(LooseBody):
         self._land()
         contact, sleep = self.in_file(*DEFAULT_CONTACT), ("sleep_tolerance",) * sleeps(option)
         softens = ("cone",) * (option.cone != ELLIPTIC and self.friction >= ROUGH)
-        is_early = option.iterations < 100, option.ls_iterations < 50, option.tolerance > 1e-8
-        ends = [name for name, early in zip(SOLVED, is_early, strict=True) if early]
+        ends = [name for name, is_early in ENDS.items() if is_early(getattr(option, name), OPTION[name].default)]
         of_contact = {"slide": (*ends, *contact), "roll": (*ends, *contact), "impact": (*ends, *softens), "rest": (*ends, *softens)}
-        self.remedies = {**REMEDIES, **{name: {end: SOLVED[end] for end in ends} for name in ends}}
+        self.remedies = {**REMEDIES, **{name: {end: OPTION[end].default for end in ends} for name in ends}}
         self.causes = {question: (*sleep, *acting, *of_contact.get(question, ())) for question, acting in CAUSES.items()}
 
     def changed(self, changes: Changes) -> LooseBody:

@@ -90,8 +90,10 @@ def _meshes(text: BodyText) -> Iterator[Ignored]:
     has, exact = text.properties(text.file.compiled), text.properties(with_exact_volumes(text.file.spec))
     for geom, name in names.items():
         points, faces = mesh_of(model, geom)
-        rest = None if is_whole(points, faces) else text.properties(without_mass_of(text.file.spec, geom))
-        if not is_whole(points, faces) and (rest is None or has is None or differ(rest.mass, has.mass)):
+        if is_whole(points, faces):
+            continue
+        rest = text.properties(without_mass_of(text.file.spec, geom))
+        if rest is None or has is None or differ(rest.mass, has.mass):
             made = "but mass and inertia are those of the first object of its file"
             yield "mesh", words(name), f"read in part: all of its {len(points)} vertices collide, {made}"
     if has is not None and exact is not None and abs(more := has.mass - exact.mass) > NOTEWORTHY * exact.mass:

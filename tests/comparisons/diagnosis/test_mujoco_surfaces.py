@@ -18,7 +18,12 @@ BESIDE = ["a start beside or below the surface"]
 def on(tmp_path, world, height=1.0, option="", geom=BOX):
     asset = '<asset><hfield name="h" nrow="2" ncol="2" size="5 5 1 .1" elevation="0 0 0 0"/></asset>'
     body = f'<body name="b" pos="0 0 {height}"><freejoint/>{geom}</body>'
-    (tmp_path / "model.xml").write_text(f"<mujoco>{asset}<option {option}/><worldbody>{world}{body}</worldbody></mujoco>")
+    return written(tmp_path, f"{asset}<option {option}/><worldbody>{world}{body}</worldbody>")
+
+
+def written(tmp_path, model):
+    """The body b of a model."""
+    (tmp_path / "model.xml").write_text(f"<mujoco>{model}</mujoco>")
     return MuJoCoModel(tmp_path / "model.xml", "model.xml").body("b", None)
 
 
@@ -44,8 +49,7 @@ def test_plane_that_is_added_has_mujocos_own_settings_not_those_of_the_default_c
     of_class = '<default><geom friction=".05" margin=".02" condim="1" contype="0" conaffinity="0"/></default>'
     geom = '<geom type="box" size=".1 .1 .1" friction=".3" margin="0" condim="3" contype="1" conaffinity="1"/>'
     body = f'<body name="b" pos="0 0 1"><freejoint/>{geom}</body>'
-    (tmp_path / "model.xml").write_text(f"<mujoco>{of_class}<worldbody>{body}</worldbody></mujoco>")
-    body = MuJoCoModel(tmp_path / "model.xml", "model.xml").body("b", None)
+    body = written(tmp_path, f"{of_class}<worldbody>{body}</worldbody>")
     assert (body.surface, body.friction) == ("a plane with default settings", 1.0)
     assert rest(body, ladder(body)[:1])[0].measured == pytest.approx(body.rest_depth, rel=1e-3)
 
@@ -69,8 +73,7 @@ def test_box_that_rattles_for_ever_is_not_at_rest_although_it_tilts(tmp_path):
     option = '<option timestep=".01"><flag refsafe="disable"/></option>'
     geom = '<geom type="box" size=".1 .05 .03" mass="2" solref=".005 1"/>'
     world = f'{FLOOR}<body name="b" pos="0 0 .5"><freejoint/>{geom}</body>'
-    (tmp_path / "model.xml").write_text(f"<mujoco>{option}<worldbody>{world}</worldbody></mujoco>")
-    body = MuJoCoModel(tmp_path / "model.xml", "model.xml").body("b", None)
+    body = written(tmp_path, f"{option}<worldbody>{world}</worldbody>")
     assert [answer.quantity for answer, _ in findings_of(body, rest)] == ["drift speed"]
 
 
@@ -103,8 +106,7 @@ def test_beam_of_a_mesh_rests_on_a_table_without_jitter(tmp_path):
     mesh = f'<option><flag multiccd="enable"/></option><asset><mesh name="beam" vertex="{corners}"/></asset>'
     body = '<body name="b" pos="0 0 .02" euler="0 0 40"><freejoint/><geom type="mesh" mesh="beam"/></body>'
     table = '<geom type="box" size="1 1 .3" pos="0 0 -.3"/>'
-    (tmp_path / "model.xml").write_text(f"<mujoco>{mesh}<worldbody>{table}{body}</worldbody></mujoco>")
-    beam = MuJoCoModel(tmp_path / "model.xml", "model.xml").body("b", None)
+    beam = written(tmp_path, f"{mesh}<worldbody>{table}{body}</worldbody>")
     depth, drift = rest(beam, ladder(beam)[:1])[:2]
     assert depth.measured == pytest.approx(beam.rest_depth, rel=1e-3)
     assert drift.measured < 1e-8

@@ -111,6 +111,11 @@ class Engine(Configured, ABC):
         """
         return None
 
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        if "prepare" in vars(cls) and "prepare_batch" not in vars(cls):
+            cls.prepare_batch = Engine.prepare_batch  # type: ignore[method-assign]  # that of another adapter would not do what `prepare` does
+
     @property
     def steps_batches(self) -> bool:
         """Whether the engine can simulate batches."""

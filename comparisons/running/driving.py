@@ -40,6 +40,10 @@ class Breakdown(Exception):
         return self.reason
 
 
+class AnotherAdapter(Breakdown):
+    """The adapter that an engine's process has is not the one that was described when the command began."""
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """What one simulation gave.

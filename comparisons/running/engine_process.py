@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from dropspin.comparisons.engines.adapter_code import adapter_code
-from dropspin.comparisons.engines.base import EngineBroken
 from dropspin.comparisons.engines.registry import constructed
 from dropspin.comparisons.engines.stand_in import StandIn
 from dropspin.comparisons.running.arguments import EngineEntry
-from dropspin.comparisons.running.driving import classify
+from dropspin.comparisons.running.driving import AnotherAdapter, classify
+from dropspin.scenarios import DropspinError
 
 PROCESSES = Path("/proc")
 PR_SET_PDEATHSIG = 1
@@ -86,7 +86,7 @@ def _constructed(entry: EngineEntry) -> EngineEntry:
     """An entry with its engine in place of a stand-in; the working directory comes last on Python's path, after all that is installed.
 
     Raises:
-        EngineBroken: The engine cannot be imported or constructed, or its code has changed since it was described.
+        AnotherAdapter: The engine cannot be imported or constructed, as it could be when it was described, or its code is another.
     """
     if entry.engine is not None and not isinstance(entry.engine, StandIn):
         return entry
@@ -95,7 +95,11 @@ def _constructed(entry: EngineEntry) -> EngineEntry:
     if entry.engine is None:
         return entry
     known, before = entry.engine.traits, frozenset(sys.modules)
-    engine = constructed(known.source, entry.engine.options)
+    try:
+        engine = constructed(known.source, entry.engine.options)
+    except DropspinError as error:
+        raise AnotherAdapter("crashed", str(error)) from None
     if adapter_code(type(engine), frozenset(sys.modules) - before) != known.code:
-        raise EngineBroken(f"the code of {known.source} has changed since the command began; give the command again")
+        remedy = "give the command again, with the same code on all machines"
+        raise AnotherAdapter("crashed", f"the code of {known.source} is not that with which the command began; {remedy}")
     return replace(entry, engine=engine)

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from dropspin.comparisons.engines.base import EngineBroken
 from dropspin.comparisons.engines.stand_in import code_of
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.results.provenance import code, provenance, versions
 from dropspin.comparisons.running.arguments import EngineEntry
-from dropspin.comparisons.running.driving import Breakdown
+from dropspin.comparisons.running.driving import AnotherAdapter, Breakdown
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.sweeps.arrays import run_side_by_side
@@ -49,7 +50,7 @@ class Work:
     @classmethod
     def of(cls, sweep: Sweep, resources: ResourceLimits) -> "Work":
         """With the versions that are installed on this machine, and hashes of the adapters' code."""
-        adapters = {f"the adapter of {engine.label}": code_of(engine) for engine in sweep.engines if not isinstance(engine, Wang)}
+        adapters = {f"the adapter of {engine.label}": code_of(engine) for engine in sweep.engines if type(engine) is not Wang}
         return cls(sweep, resources, installed_versions() | adapters)
 
     @cached_property
@@ -86,7 +87,7 @@ class Work:
         swept = {axis.name: axis.values for axis in self.sweep.axes}
         longest = max(swept.get("duration", [scene.duration for scene in self.sweep.scenes]))
         steps = longest / min([*self.sweep.dts, *swept.get("dt", [])])
-        slow = any(not isinstance(engine, Wang) for engine in self.sweep.engines) or bool(self.sweep.metrics)
+        slow = any(type(engine) is not Wang for engine in self.sweep.engines) or bool(self.sweep.metrics)
         return int(min(max(PART_TIME / (JOB_TIME[slow] + STEP_TIME[slow] * steps), 1), LARGEST_PART))
 
     @property
@@ -110,9 +111,15 @@ class Work:
         entry = EngineEntry(jobs.engine.label, jobs.engine)
         first, last = int(jobs.numbers[0]), int(jobs.numbers[-1]) + 1
 
-        def outcome(number: int) -> Outcomes:
+        def called(first: int, last: int) -> Outcomes | Breakdown:
             verify_running()
-            result = processes.call(entry, _run_in_process, self.sweep, number, number + 1)
+            result = processes.call(entry, _run_in_process, self.sweep, first, last)
+            if isinstance(result, AnotherAdapter):  # not what these jobs do: their results would be kept for good
+                raise EngineBroken(f"{entry.label} cannot be used any more: {result.reason.removesuffix('.')}.")
+            return result
+
+        def outcome(number: int) -> Outcomes:
+            result = called(number, number + 1)
             if not isinstance(result, Breakdown):
                 return result
             verify_running()  # a process that ended with the sweep has not failed
@@ -120,8 +127,7 @@ class Work:
             set_breakdown(broken[0], result)
             return broken
 
-        verify_running()
-        outcomes = processes.call(entry, _run_in_process, self.sweep, first, last)
+        outcomes = called(first, last)
         if isinstance(outcomes, Breakdown):
             return concatenated([outcome(number) for number in range(first, last)])
         # An exception may be due to earlier jobs, for example to a leak. It counts if the job raises it in a new process as well.
@@ -149,7 +155,7 @@ def run_jobs(sweep: Sweep, first: int, last: int) -> Outcomes:
     """
     parts = []
     for jobs in sweep.jobs(first, last):
-        is_reference = isinstance(jobs.engine, Wang)
+        is_reference = type(jobs.engine) is Wang  # a subclass may simulate otherwise
         parts.append(run_side_by_side(jobs, sweep.metrics) if is_reference else not_run(len(jobs), sweep.metrics))
         run_scenes(jobs, parts[-1], sweep.metrics, in_batches=jobs.engine.steps_batches and not is_reference)
     return concatenated(parts)

@@ -152,7 +152,7 @@ def test_adapter_that_changes_during_a_run_is_not_mixed_with_itself(tmp_path, mo
     assert judged(found, "mine") == {("crashed", "its process ended with exit code 1")}
     other = ds.run([DRIFT, DRIFT | {"name": "again"}], "mine:Mine", 1e-2, resources=LIMITS).table
     reasons = other.set_index("scene")["reason"]
-    assert "the code of mine:Mine has changed since the command began" in reasons["again"]
+    assert "the code of mine:Mine is not that with which the command began" in reasons["again"]
 
 
 @pytest.mark.extended

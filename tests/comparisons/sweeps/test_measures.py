@@ -2,6 +2,7 @@
 
 import itertools
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +12,12 @@ from support import engines as made
 
 import dropspin as ds
 from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.measuring.batch_quantities import motions_side_by_side
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.motion_quantities import Motions, Setup
+from dropspin.comparisons.running.driving import record_batch
 from dropspin.comparisons.running.verification import UNIT_TOLERANCE
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, concatenated, not_run, run_scenes, standard_metrics
 from dropspin.comparisons.sweeps.parts import run_jobs
@@ -237,6 +240,25 @@ def test_other_engines_keep_no_state_between_jobs(label):
     sweep = load_sweep(spec)
     backwards = [run_jobs(sweep, number, number + 1) for number in reversed(range(sweep.size))]
     assert_same(run_jobs(sweep, 0, sweep.size), concatenated(backwards[::-1]))
+
+
+class Hasty(Wang):
+    """Its steps are one per cent longer than asked."""
+
+    name = "hasty"
+
+    def prepare(self, scene, dt):
+        return super().prepare(scene, 1.01 * dt)
+
+
+def test_adapter_that_extends_another_is_simulated_by_its_own_code():
+    """Neither in the arrays of a sweep nor in a batch of a run: the adapter that it extends would take its place."""
+    hasty, scene = Hasty(), load("fall-spin")
+    sweep = replace(load_sweep({"scenes": ["fall-spin"], "engines": ["wang"], "dts": [1e-2]}), engines=(hasty,))
+    states = ds.simulate(scene, hasty, 1e-2).states
+    np.testing.assert_array_equal(run_jobs(sweep, 0, 1).state[0], states[-1])
+    np.testing.assert_array_equal(record_batch(hasty, [scene, scene], 1e-2)[1].motion.states, states)
+    assert states[-1][1] < ds.simulate(scene, "wang", 1e-2).states[-1][1] - 0.05
 
 
 def test_requested_metrics_are_those_of_measure():

@@ -18,10 +18,11 @@ import pandas as pd
 import pytest
 from support import engines as test_engines
 
-from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.engines.base import Diverged, EngineBroken
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import Closed
+from dropspin.comparisons.sweeps import parts
 from dropspin.comparisons.sweeps.folder import read_sweep
 from dropspin.comparisons.sweeps.parts import Work
 from dropspin.comparisons.sweeps.running import run_sweep
@@ -100,6 +101,22 @@ def test_engine_that_breaks_costs_its_own_rows(tmp_path):
     run_sweep(sweep, str(tmp_path / "wang"))
     document = found[found["engine"] == "wang"].reset_index(drop=True)
     pd.testing.assert_frame_equal(document, table(tmp_path / "wang"), check_exact=True)
+
+
+@pytest.mark.extended
+@pytest.mark.usefixtures("engine_processes")
+@pytest.mark.parametrize(("text", "reason"), [("changed = True", "is not that with which"), ("1 / 0", "cannot be imported: ZeroDivision")])
+def test_adapter_that_changes_ends_the_sweep_and_what_is_written_is_kept(text, reason, tmp_path, monkeypatch):
+    """Its jobs would be kept as crashed, for good: on a cluster too, where a worker may have another copy."""
+    monkeypatch.setattr(parts, "LARGEST_PART", 1)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    crash = f"lambda self, *given: (open('mine.py', 'a').write('\\n{text}'), os._exit(1))"
+    head = "import os\nfrom dropspin.comparisons.engines.wang import Wang\nclass Mine(Wang):\n"
+    (tmp_path / "mine.py").write_text(f"{head}    name = 'mine'\n    prepare = prepare_batch = {crash}\n")
+    with pytest.raises(EngineBroken, match=rf"mine cannot be used any more: .*{reason}"):
+        run_sweep(load_sweep(SPEC | {"engines": ["wang", "mine:Mine"]}), str(tmp_path / "out"))
+    assert set(read_sweep(str(tmp_path / "out"))["engine"]) == {"wang"}
 
 
 class Leaking(test_engines.Exact):

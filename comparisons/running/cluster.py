@@ -1,5 +1,6 @@
 """The connection to a Dask cluster, on which studies run."""
 
+import logging
 import re
 import time
 from collections.abc import Iterator
@@ -34,7 +35,7 @@ def connected(scheduler: str) -> Iterator[Any]:
     if find_spec("distributed") is None:
         raise EngineMissing(f"--scheduler needs Dask, which is not installed: {install_extra('cluster')}.")
     from distributed import Client, KilledWorker, Security
-    from distributed.comm.core import connect
+    from distributed.comm.core import CommClosedError, connect
     from distributed.utils import LoopRunner
 
     async def greet() -> None:
@@ -48,6 +49,7 @@ def connected(scheduler: str) -> Iterator[Any]:
         is_connected = isinstance(error, TimeoutError) or not isinstance(error, OSError | ValueError)
         reason = "the program at this address does not answer as a scheduler" if is_connected else f"no scheduler answers ({error})"
         raise failed(f"{reason}; start one with: dask scheduler") from None
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what is lost is said below, in one line
     client = Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)  # type: ignore[no-untyped-call]
     with client, client.as_current():
         end = time.monotonic() + WORKER_TIMEOUT
@@ -57,7 +59,9 @@ def connected(scheduler: str) -> Iterator[Any]:
             time.sleep(POLL)
         try:
             yield client
-        except CancelledError:
+        except (CancelledError, OSError) as error:
+            if client.status == "running" and not isinstance(error, CancelledError | CommClosedError):
+                raise  # of the folder, not of the connection
             kept = "what is finished is kept, and the same command continues, that of a sweep with --resume"
             raise failed(f"the connection was lost; {kept}") from None
         except KilledWorker as error:

@@ -103,7 +103,8 @@ def _run_on_cluster(client: Any, work: Work, parts: Iterator[range], folder: Swe
                     f"{folder.where}: a part that a worker wrote is not visible from here; give a folder that all machines share."
                 )
     finally:
-        client.run(_close_idle_processes, on_error="ignore")
+        if client.status == "running":  # else the scheduler is lost, and with it the way to its workers
+            client.run(_close_idle_processes, on_error="ignore")
 
 
 _Owner = tuple[str, ResourceLimits]

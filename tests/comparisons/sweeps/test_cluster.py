@@ -88,6 +88,23 @@ def test_table_is_the_same_after_a_worker_is_killed(workers, tmp_path):
 
 
 @pytest.mark.extended
+@pytest.mark.parametrize("workers", [1], indirect=True)
+def test_scheduler_that_is_killed_is_reported_with_the_remedy(workers, tmp_path, monkeypatch, capfd):
+    """In one line: distributed prints exceptions of its own."""
+    address, [worker] = workers
+    scheduler = int(Path(f"/proc/{worker}/stat").read_text().rpartition(")")[2].split()[1])
+    monkeypatch.setattr(connection, "CONNECT_TIMEOUT", 2.0)
+
+    def kill(jobs):
+        if jobs:
+            os.kill(scheduler, signal.SIGKILL)
+
+    with pytest.raises(DropspinError, match="the connection was lost; what is finished is kept, and the same command continues"):
+        run_sweep(load_sweep(SPEC | {"dts": [1e-4]}), str(tmp_path / "s"), scheduler=address, on_progress=kill)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.extended
 @pytest.mark.parametrize("workers", [0], indirect=True)
 def test_scheduler_without_workers_is_reported(workers, tmp_path, monkeypatch):
     monkeypatch.setattr(connection, "WORKER_TIMEOUT", 0.5)

@@ -113,39 +113,36 @@ class TradeOff:
 
     @property
     def pareto_front(self) -> list[CostPoint]:
-        """The configurations for which no other one is both more accurate and cheaper; cheapest first."""
-        return _pareto_front(self.points, lambda point: point.typical_cost)
+        """The configurations for which no other one is both more accurate and cheaper, by `reached`; cheapest first."""
+        return self._pareto_front(self.points, lambda point: point.typical_cost)
 
     @property
     def undecided(self) -> list[CostPoint]:
         """The configurations for which the smallest, median and upper-quartile costs disagree on the Pareto front; cheapest first."""
         costs = [lambda point, share=share: float(np.quantile(point.cost, share)) for share in (0.0, 0.5, 0.75)]
-        fronts = [frozenset(_pareto_front(self.points, cost)) for cost in costs]
+        fronts = [frozenset(self._pareto_front(self.points, cost)) for cost in costs]
         differing = frozenset().union(*fronts) - fronts[0].intersection(*fronts)
         return sorted(differing, key=lambda point: point.typical_cost)
 
     def batch_pareto_front(self, worlds: int) -> list[CostPoint]:
         """The Pareto front by cost per world in batches of a size, for engines that can simulate them."""
         points = [point for point in self.points if worlds in point.costs_per_world]
-        return _pareto_front(points, lambda point: point.costs_per_world[worlds])
+        return self._pareto_front(points, lambda point: point.costs_per_world[worlds])
 
     @property
     def dominated(self) -> dict[CostPoint, CostPoint]:
         """For each engine that is not on the Pareto front, its most accurate configuration and the cheapest one at least as accurate."""
         front = self.pareto_front
-        best = {point.engine: point for point in sorted(self.points, key=lambda point: point.error, reverse=True)}
+        best = {point.engine: point for point in sorted(self.points, key=lambda point: (self.reached(point), point.error), reverse=True)}
         on_front = {point.engine for point in front}
         inside = [best[ladder.engine] for ladder in self.ladders if ladder.engine in best.keys() - on_front]
-        return {point: next(other for other in front if other.error <= point.error) for point in inside}
+        return {point: next(other for other in front if self.reached(other) <= self.reached(point)) for point in inside}
 
     def recommendation(self, within: float) -> Recommendation | None:
         """The cheapest configuration within a tolerance; None if there is none.
 
         Args:
-            within: The tolerance, in the metric's unit.
-
-        A time step counts only if the errors at all smaller time steps of the engine are finite and also within the tolerance. Otherwise
-        its error may be small by chance, because it changes sign near this time step.
+            within: The tolerance, in the metric's unit, for `reached`.
         """
         cheapest = {point.engine: point for point in sorted(self._within(within), key=lambda point: point.typical_cost, reverse=True)}
         if not cheapest:
@@ -168,16 +165,20 @@ class TradeOff:
         batched = [point for point in self._within(within) if worlds in point.costs_per_world]
         return min(batched, key=lambda point: point.costs_per_world[worlds], default=None)
 
+    def reached(self, point: CostPoint) -> float:
+        """The largest error of an engine at a time step and at all smaller ones; infinite if one of them is not finite.
+
+        The error at one time step may be small by chance, because it changes sign near this step.
+        """
+        errors = [error for ladder in self.ladders if ladder.engine == point.engine for dt, error in ladder.completed if dt <= point.dt]
+        return max(errors) if np.isfinite(errors).all() else math.inf
+
     def _within(self, within: float) -> list[CostPoint]:
-        """The configurations within a tolerance, with those of the same engine at all finer time steps."""
-        exceeding = {ladder.engine: [dt for dt, error in ladder.completed if not error <= within] for ladder in self.ladders}
-        finest = {engine: min(dts, default=math.inf) for engine, dts in exceeding.items()}
-        return [point for point in self.points if point.error <= within and point.dt < finest[point.engine]]
+        return [point for point in self.points if self.reached(point) <= within]
 
-
-def _pareto_front(points: Sequence[CostPoint], cost: Callable[[CostPoint], float]) -> list[CostPoint]:
-    front: list[CostPoint] = []
-    for point in sorted(points, key=lambda point: (cost(point), point.error)):
-        if not front or point.error < front[-1].error:
-            front.append(point)
-    return front
+    def _pareto_front(self, points: Sequence[CostPoint], cost: Callable[[CostPoint], float]) -> list[CostPoint]:
+        front: list[CostPoint] = []
+        for point in sorted(points, key=lambda point: (cost(point), self.reached(point))):
+            if not front or self.reached(point) < self.reached(front[-1]):
+                front.append(point)
+        return front

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from dropspin.comparisons.engines.registry import engine_names as engine_names
     from dropspin.comparisons.judging.error_budget import ErrorBudget as ErrorBudget
     from dropspin.comparisons.judging.error_budget import error_budget as error_budget
-    from dropspin.comparisons.limits.study import RobustnessStudy as RobustnessStudy
+    from dropspin.comparisons.limits.study import LimitsStudy as LimitsStudy
     from dropspin.comparisons.limits.study import find_limits as find_limits
     from dropspin.comparisons.logs.check import log_check as log_check
     from dropspin.comparisons.logs.compare import LogComparison as LogComparison

@@ -94,7 +94,7 @@ class AxisScan:
 
 
 @dataclass(frozen=True)
-class RobustnessStudy:
+class LimitsStudy:
     """The failure modes of engines at extreme values of a scene.
 
     Attributes:
@@ -141,7 +141,7 @@ def find_limits(
     on_progress: Callable[[str, float], None] | None = None,
     resources: ResourceLimits = ONE_MINUTE,
     jobs: int | None = None,
-) -> RobustnessStudy:
+) -> LimitsStudy:
     """Vary one quantity of a scene at a time, up to extreme values, and find the failure modes of engines.
 
     Args:
@@ -186,7 +186,7 @@ def find_limits(
         results = results_in_parallel(present, refined, crews, lambda work, done: callback(work, share * done))
         refinements = {entry.label: points for entry, points in zip(present, results, strict=True)}
         scans = results_in_parallel(pieces, scanned, crews, lambda work, done: callback(work, share + (1.0 - share) * done))
-    return RobustnessStudy(scene, dt, within, tuple(scans), left_out, refinements)
+    return LimitsStudy(scene, dt, within, tuple(scans), left_out, refinements)
 
 
 def _axes(scene: Scenario, names: Sequence[str]) -> list[Axis]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from dropspin.comparisons.limits.axes import Axis
 from dropspin.comparisons.limits.failure_modes import FAILURE_MODES
-from dropspin.comparisons.limits.study import AxisScan, RobustnessStudy
+from dropspin.comparisons.limits.study import AxisScan, LimitsStudy
 from dropspin.reports.plots.chart import Chart, Line, draw
 from dropspin.reports.plots.style import plain
 
@@ -30,7 +30,7 @@ COLOURS = {
 BAR = 10.0  # points
 
 
-def failure_modes(found: RobustnessStudy, axis_name: str) -> Chart:
+def failure_modes(found: LimitsStudy, axis_name: str) -> Chart:
     """The failure mode of each engine along an axis of a study of limits; a dotted line marks the nominal value of the scene.
 
     Args:
@@ -57,7 +57,7 @@ def failure_modes(found: RobustnessStudy, axis_name: str) -> Chart:
     )
 
 
-def plot_failure_modes(found: RobustnessStudy, axis_name: str, axes: "Axes") -> None:
+def plot_failure_modes(found: LimitsStudy, axis_name: str, axes: "Axes") -> None:
     """Draw `failure_modes` into axes."""
     draw(failure_modes(found, axis_name), axes)
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from dropspin.comparisons.judging.verdicts import FAILURES
-from dropspin.comparisons.limits.study import RobustnessStudy
+from dropspin.comparisons.limits.study import LimitsStudy
 from dropspin.comparisons.measuring.predictions import spins_steadily
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.bounces import bounce_ladder
@@ -91,7 +91,7 @@ def tradeoff_charts(found: "TradeOff") -> list[Chart]:
     return [*charts, throughput(found)] if len(batches) > 1 else charts
 
 
-def limits_charts(found: RobustnessStudy) -> list[Chart]:
+def limits_charts(found: LimitsStudy) -> list[Chart]:
     """The failure modes of all engines along each axis of a scene."""
     return [failure_modes(found, name) for name in dict.fromkeys(scan.axis.name for scan in found.scans)]
 

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from dropspin.comparisons.limits.axes import AXES
-from dropspin.comparisons.limits.study import AxisScan, RobustnessStudy, ScanPoint
+from dropspin.comparisons.limits.study import AxisScan, LimitsStudy, ScanPoint
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Rows, Sentences, Table
 from dropspin.reports.plots.run_charts import limits_charts
 from dropspin.reports.stories.numbers import duration, left_out
@@ -25,7 +25,7 @@ class Limits(Study):
     """The results of `dropspin limits` in each scene, and which scenes lack an axis."""
 
     study: Literal["limits"] = "limits"
-    scenes: list[RobustnessStudy]
+    scenes: list[LimitsStudy]
     left_out: dict[str, str] = Field(default_factory=dict)
 
     def rows(self) -> Records:
@@ -46,7 +46,7 @@ class Limits(Study):
         return Document("Where engines break down", parts, summary)
 
 
-def _rows(study: RobustnessStudy) -> Records:
+def _rows(study: LimitsStudy) -> Records:
     """A row for each value of each scan and for each smaller time step tried at the nominal values, and one for each engine left out."""
     name, scanned = study.scene.name, {scan.engine for scan in study.scans if scan.axis.name == "step"}
     points = [(scan.engine, scan.axis, point) for scan in study.scans for point in scan.points]
@@ -57,7 +57,7 @@ def _rows(study: RobustnessStudy) -> Records:
     return [dict(zip(COLUMNS, row, strict=True)) for row in [*tested, *missing]]
 
 
-def nominal(study: RobustnessStudy) -> str:
+def nominal(study: LimitsStudy) -> str:
     """The conditions of a study: scene, time step and tolerance. An axis may vary the time step."""
     return (
         f"{study.scene.name} at dt = {duration(study.dt)}. "
@@ -65,7 +65,7 @@ def nominal(study: RobustnessStudy) -> str:
     )
 
 
-def step_rows(studies: Sequence[RobustnessStudy]) -> Rows:
+def step_rows(studies: Sequence[LimitsStudy]) -> Rows:
     """The largest tested time steps at which each engine is accurate and stable, for each scene."""
     rows = []
     for study in studies:
@@ -89,7 +89,7 @@ def _mode(point: ScanPoint) -> str:
     return point.mode.replace("_", " ")
 
 
-def range_rows(study: RobustnessStudy) -> Rows:
+def range_rows(study: LimitsStudy) -> Rows:
     """The range in which each engine is sound along each axis, and the failure modes beyond."""
     modes = {engine: _mode(points[0]) for engine, points in study.refinements.items() if points[0].mode != "sound"}
     return [{"axis": scan.axis.label, "engine": scan.engine, **_range(scan, modes.get(scan.engine))} for scan in study.scans]
@@ -121,7 +121,7 @@ def _outside(scan: AxisScan) -> list[ScanPoint]:
     return [scan.points[number] for number in (first - 1, last + 1) if 0 <= number < len(scan.points)]
 
 
-def sentences(study: RobustnessStudy) -> list[str]:
+def sentences(study: LimitsStudy) -> list[str]:
     """Sentences on engines that are not sound at the nominal values, on crashes beyond a sound range, and on engines left out."""
     failing = [(engine, points) for engine, points in study.refinements.items() if points[0].mode != "sound"]
     crashes = [

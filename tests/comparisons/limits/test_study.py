@@ -1,4 +1,4 @@
-"""Robustness: axes change one quantity each, failure modes follow their criteria, and planted faults are found where they begin.
+"""Limits: axes change one quantity each, failure modes follow their criteria, and planted faults are found where they begin.
 
 The file is longer than 300 lines because its tests share the engines with faults that it defines.
 """
@@ -17,7 +17,7 @@ from dropspin.comparisons.limits.axes import AXES
 from dropspin.comparisons.limits.failure_modes import SOUND, ExtendedMotion, clamped, diagnose, held_speeds
 from dropspin.comparisons.limits.operating_point import OperatingPoint, in_nominal_units
 from dropspin.comparisons.limits.runner import Runner
-from dropspin.comparisons.limits.study import AxisScan, RobustnessStudy, ScanPoint, find_limits, scan_axis
+from dropspin.comparisons.limits.study import AxisScan, LimitsStudy, ScanPoint, find_limits, scan_axis
 from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
@@ -468,7 +468,7 @@ def test_largest_steps_are_those_whose_finer_steps_all_pass():
         ScanPoint(value, SOUND._replace(mode=mode))
         for value, mode in ((0.001, "sound"), (0.01, "inaccurate"), (0.1, "sound"), (1.0, "diverged"))
     )
-    study = RobustnessStudy(SPIN, DT, 0.1, (AxisScan(AXES["step"], "exact", 0.001, points),), {}, {})
+    study = LimitsStudy(SPIN, DT, 0.1, (AxisScan(AXES["step"], "exact", 0.001, points),), {}, {})
     assert study.largest_steps("exact") == (0.001, 0.1)
 
 

@@ -10,7 +10,7 @@ from support.cli import TERMINAL
 
 from dropspin.comparisons.limits.axes import AXES
 from dropspin.comparisons.limits.failure_modes import Diagnosis
-from dropspin.comparisons.limits.study import AxisScan, RobustnessStudy, ScanPoint
+from dropspin.comparisons.limits.study import AxisScan, LimitsStudy, ScanPoint
 from dropspin.reports import plots
 from dropspin.reports.stories import limits
 from dropspin.reports.study_files import write_study
@@ -38,7 +38,7 @@ def study():
         scan("a", ["sound", "inaccurate"], "step"),
     )
     refinements = {"a": (points_of("sound", dt=1.0),), "b": (points_of("inaccurate"), points_of("sound", dt=2.5e-3))}
-    return RobustnessStudy(SPIN, 5e-3, 0.1, scans, {"c": "not installed"}, refinements)
+    return LimitsStudy(SPIN, 5e-3, 0.1, scans, {"c": "not installed"}, refinements)
 
 
 def test_tables_of_largest_steps_and_of_sound_ranges(study):
@@ -65,7 +65,7 @@ def test_sound_range_around_the_nominal_value():
     masses = scan("a", ["sound"] * 4, "mass"), scan("b", ["sound"] * 4, "mass")
     changing = scan("b", ["sound", "sound", "inaccurate"], "mass")
     scans = (replace(found, base=1e3), replace(found, base=10.0), scan("a", ["sound"] * 4), *masses, changing)
-    study = RobustnessStudy(SPIN, 5e-3, 0.1, scans, {}, {"b": (points_of("inaccurate"),)})
+    study = LimitsStudy(SPIN, 5e-3, 0.1, scans, {}, {"b": (points_of("inaccurate"),)})
     assert [(row["sound from"], row["to"], row["beyond"]) for row in limits.range_rows(study)] == [
         ("100", "1e+04", "inaccurate at 10; clamped at 1e+05"),
         ("–", "–", "inaccurate at the nominal value, 10; sound at 5 of 7 tested values"),
@@ -77,7 +77,7 @@ def test_sound_range_around_the_nominal_value():
 
 
 def test_engine_that_is_accurate_at_no_step_has_the_smallest_one_tried():
-    study = RobustnessStudy(SPIN, 5e-3, 0.1, (scan("a", ["inaccurate", "inaccurate", "diverged"], "step"),), {}, {})
+    study = LimitsStudy(SPIN, 5e-3, 0.1, (scan("a", ["inaccurate", "inaccurate", "diverged"], "step"),), {}, {})
     [row] = limits.step_rows([study])
     assert (row["accurate up to"], row["stable up to"]) == ("inaccurate at 1 s, the smallest tested", "10 s, 50 rad")
 
@@ -130,7 +130,7 @@ def test_axis_of_the_figure_holds_the_smaller_steps_of_every_engine():
     coarse, fine = scan("a", ["sound"] * 3, "step"), scan("b", ["inaccurate"] * 3, "step")
     fine = replace(fine, points=(points_of("sound", dt=1e-3), *fine.points))
     axes = plt.figure().gca()
-    plots.plot_failure_modes(RobustnessStudy(SPIN, 5e-3, 0.1, (coarse, fine), {}, {}), "step", axes)
+    plots.plot_failure_modes(LimitsStudy(SPIN, 5e-3, 0.1, (coarse, fine), {}, {}), "step", axes)
     assert axes.get_xlim() == pytest.approx((math.log(1e-3), math.log(100.0)))
     plt.close("all")
 

@@ -40,7 +40,7 @@ SETTLING, WATCHED = 5.0, 1.0  # s; the body is measured at rest in the last seco
 LARGEST_STEP = 0.1  # s; the search for the largest stable step ends here
 LONG = 3.0  # s
 DROPS = 8
-SUNK = 0.1  # m
+SUNK, SUNK_FOR = 0.1, 1.0  # m, s
 GAIN = 1.02
 """Height, relative to the drop height, above which a body counts as having gained energy."""
 FINELY = 1.01
@@ -186,7 +186,7 @@ def _bounces(motion: Motion, dt: float) -> tuple[Array, Array, float]:
 def _largest_step(motion: Motion, dt: float) -> tuple[float, str]:
     """The largest time step at which a body neither gains energy nor sinks, and how it was found."""
     if not _is_stable(motion, dt):
-        return math.nan, f"unstable already at {dt:g} s: the body gains 2 % of its height, or sinks by {SUNK:g} m"
+        return math.nan, f"unstable already at {dt:g} s: the body gains 2 % of its height, or stays {SUNK:g} m below the floor"
     stable = dt
     while (longer := min(2.0**0.125 * stable, LARGEST_STEP)) > stable and _is_stable(motion, longer):
         stable = longer
@@ -196,9 +196,11 @@ def _largest_step(motion: Motion, dt: float) -> tuple[float, str]:
     while unstable > FINELY * stable:
         middle = math.sqrt(stable * unstable)
         stable, unstable = (middle, unstable) if _is_stable(motion, middle) else (stable, middle)
-    return stable, f"with the same settings; beyond it a drop from {DROP:g} m gains 2 % of its height or ends {SUNK:g} m below the floor"
+    return stable, f"with the same settings; beyond it a drop from {DROP:g} m gains 2 % of its height or stays {SUNK:g} m below the floor"
 
 
 def _is_stable(motion: Motion, dt: float) -> bool:
-    drops = [np.array(motion(DROP + IMPACT * dt * part, math.ceil(LONG / dt), dt)[0]) for part in (np.arange(DROPS) + 0.5) / DROPS]
-    return all(bool(np.isfinite(height).all() and height.max() <= GAIN * height[0] and height[-1] > -SUNK) for height in drops)
+    steps = math.ceil(LONG / dt)
+    drops = [np.array(motion(DROP + IMPACT * dt * part, steps, dt)[0]) for part in (np.arange(DROPS) + 0.5) / DROPS]
+    last = math.ceil(SUNK_FOR / dt)  # at a single time it may be deep in an impact
+    return all(bool(np.isfinite(height).all() and height.max() <= GAIN * height[0] and height[-last:].max() > -SUNK) for height in drops)

@@ -163,6 +163,28 @@ def test_restitution_of_bullet_does_not_depend_on_the_step(e):
     assert value(calibrate(engine("pybullet"), e, 2e-3), "restitution at half the step") == pytest.approx(e, abs=1e-12)
 
 
+def elastic(drop, steps, dt):
+    """The exact heights of a body that falls freely and rebounds from springs half a metre deep."""
+    fall, rate = math.sqrt(2.0 * drop / calibration.GRAVITY), math.sqrt(2.0 * calibration.GRAVITY * drop) / 0.5
+    since = (dt * np.arange(steps + 1) + fall) % (2.0 * fall + math.pi / rate)  # the last apex was half a flight earlier
+    flying = drop - calibration.GRAVITY * (since - fall) ** 2 / 2.0
+    return np.where(since < 2.0 * fall, flying, -0.5 * np.sin(rate * (since - 2.0 * fall))), None
+
+
+def sinking(drop, steps, dt):
+    """The exact heights of a body that lands and sinks at 5 cm/s."""
+    t = dt * np.arange(steps + 1)
+    fall = math.sqrt(2.0 * drop / calibration.GRAVITY)
+    return np.where(t < fall, drop - calibration.GRAVITY * t**2 / 2.0, -0.05 * (t - fall)), None
+
+
+def test_body_deep_in_an_impact_has_not_sunk():
+    """At whatever time the motion ends; one that sinks slowly has."""
+    assert (elastic(1.0, 300, 0.01)[0][-60:] < -calibration.SUNK).any()
+    assert calibration._largest_step(elastic, 0.01)[0] == calibration.LARGEST_STEP
+    assert math.isnan(calibration._largest_step(lambda *given: (sinking(*given)[0] - 0.05, None), 0.01)[0])
+
+
 @pytest.mark.extended
 def test_largest_stable_step_of_bullet_is_the_largest_tested():
     """Restitution at any step: no step up to 0.1 s gains energy."""

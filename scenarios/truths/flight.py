@@ -28,7 +28,7 @@ from dropspin.scenarios.truths.free_rotor import FreeRotor, free_rotor
 from dropspin.scenarios.truths.truth import Truth
 
 UNDAMPED = Damping()
-TURNS_OVER = "rounding of the initial state determines when the body turns over"
+TURNS_OVER = "rounding of the initial state and of the moments of inertia determines when the body turns over"
 SERIES_TERMS = 22  # enough for 17 digits of φ₂ up to z = 1
 
 

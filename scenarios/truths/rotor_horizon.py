@@ -8,7 +8,9 @@ With a < b < c or a > b > c the principal axes, P = |I_c (I_c - I_b)| and Q = |I
 
 near which one factor grows as e^(λt), λ² = (I_c - I_b) (I_b - I_a) ω_b²/(I_a I_c). An error δ of a factor, over its largest value F,
 becomes δ/F (e^(λt) - 1) rad of the orientation; a relative error κ of the moments, which does not change the initial state, becomes κ (cosh
-λt - 1). If these errors change S by at most the share `TOLERANCE`, they only change the time at which the body turns over, by that share.
+λt - 1). If these errors change S by a small share, they only change the time at which the body turns over. Where they change the
+complementary parameter m₁ of the elliptic functions of λt, which is S I_c (I_c - I_a) over P (L² - 2 T I_a), by the share σ, and λ by the
+share τ, that time changes by less than the share σ/(2K) + τ, K ≥ π/2 being the quarter period, and the orientation by (σ/π + τ) λt.
 
 Source: linearised Euler equations, L. D. Landau & E. M. Lifshitz, Mechanics, section 37.
 """
@@ -26,6 +28,8 @@ undetermined.
 """
 
 EPS = 2.0**-52
+SMALL_SHARE = 1e-3
+"""The largest share of S whose effect counts as proportional to it."""
 
 
 def spin_rounding(orientation: Array, angular_velocity: Array) -> Array:
@@ -45,19 +49,26 @@ def horizon(moments: tuple[float, ...], spin: tuple[Fraction, ...], rounding: Ar
     """
     Ia, Ib, Ic = map(Fraction, moments)
     P, Q = math.sqrt(abs(Ic * (Ic - Ib))), math.sqrt(abs(Ia * (Ib - Ia)))
-    at_c, at_a = P * abs(float(spin[2])), Q * abs(float(spin[0]))
-    of_state = P * rounding[2] + Q * rounding[0]
-    of_c, of_a = (at * EPS * float((Ij + Ik) / abs(Ij - Ik)) if Ij != Ik else 0.0 for at, Ij, Ik in ((at_c, Ic, Ib), (at_a, Ib, Ia)))
-    separation = abs(float(Ic * (Ic - Ib) * spin[2] ** 2 - Ia * (Ib - Ia) * spin[0] ** 2))
-    change_c, change_a = P * rounding[2] + of_c, Q * rounding[0] + of_a
-    change = (2.0 * at_c + change_c) * change_c + (2.0 * at_a + change_a) * change_a
-    if change <= TOLERANCE * separation or P * Q == 0.0:
+    if P * Q == 0.0:
         return math.inf
-    to_a = float(abs(Ib * (Ib - Ia) * spin[1] ** 2 + Ic * (Ic - Ia) * spin[2] ** 2))
+    at_c, at_a = P * abs(float(spin[2])), Q * abs(float(spin[0]))
+    if at_a > at_c:  # L circles c
+        return horizon(moments[::-1], spin[::-1], rounding[::-1])
+    relative_c, relative_a = (0.5 * EPS * float((Ij + Ik) / abs(Ij - Ik)) for Ij, Ik in ((Ic, Ib), (Ib, Ia)))
+    of_state, of_moments = P * rounding[2] + Q * rounding[0], relative_c * at_c + relative_a * at_a
+    change_c, change_a = P * rounding[2] + relative_c * at_c, Q * rounding[0] + relative_a * at_a
+    change = (2.0 * at_c + change_c) * change_c + (2.0 * at_a + change_a) * change_a
+    separation = abs(float(Ic * (Ic - Ib) * spin[2] ** 2 - Ia * (Ib - Ia) * spin[0] ** 2))
+    of_b = float(abs(Ib * (Ib - Ia) * spin[1] ** 2))
+    to_a = of_b + float(abs(Ic * (Ic - Ia) * spin[2] ** 2))
     rate = math.sqrt(float(abs(Ic - Ib) / (Ia * Ib * Ic)) * to_a)
-    largest = P * math.sqrt(to_a / float(abs(Ic * (Ic - Ia))))
     speed = math.sqrt(float(sum(w * w for w in spin)))
-    return _crossing(of_state / largest, (of_c + of_a) / largest, speed / rate) / rate
+    of_m1 = 2.0 * (at_c * P * rounding[2] + at_a * Q * rounding[0] + (relative_c + relative_a) * at_a**2)  # times the separation
+    shift = of_m1 / math.pi + (relative_c + relative_a * of_b / to_a) * separation
+    if change <= SMALL_SHARE * separation and shift * rate <= TOLERANCE * separation * speed:
+        return math.inf
+    largest = P * math.sqrt(to_a / float(abs(Ic * (Ic - Ia))))
+    return _crossing(of_state / largest, of_moments / largest, speed / rate) / rate
 
 
 def _crossing(of_state: float, of_moments: float, angle: float) -> float:

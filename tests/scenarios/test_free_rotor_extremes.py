@@ -153,8 +153,25 @@ def test_only_starts_that_rounding_decides_have_a_horizon(orientation, spin, is_
     assert np.isfinite(rotor.horizon) == is_limited
 
 
+@pytest.mark.extended
+@pytest.mark.parametrize(("apart", "spin"), [(5e-7, (0.3, 0.2, 0.8)), (5e-7, (2.0, 0.3, 0.1)), (1e-5, (0.0, 1.0, 0.9))])
+@pytest.mark.parametrize("is_needle", [True, False])
+def test_nearly_equal_moments_have_no_horizon_away_from_the_separatrix(is_needle, apart, spin):
+    """One eps of each moment changes the orientation by less than the tolerance, also after 80 rad: it grows in proportion to time."""
+    moments = np.array([1e-6 + apart, 1.0 - apart, 1.0]) if is_needle else np.array([1.0, 1.0 + apart, 2.0])
+    rotor = free_rotor(np.diag(moments), IDENTITY, np.array(spin))
+    assert rotor.horizon == np.inf
+    times = TURNED / np.linalg.norm(spin) * 2.0
+    exact, _ = exact_motion(moments, spin, IDENTITY, times)
+    others = [
+        exact_motion(moments * (1.0 + EPS * np.array(signs)), spin, IDENTITY, times)[0] for signs in ((0, 1, -1), (-1, 1, 0), (1, 0, -1))
+    ]
+    for other in others:
+        assert (angle_between_orientations(exact, other) <= TOLERANCE * np.linalg.norm(spin) * times).all()
+
+
 def test_equal_moments_and_spins_of_symmetric_bodies_have_no_horizon():
-    for moments in ((1.0, 1.0, 1.0), (1.0, 1.0, 1.5), (1.0, 1.5, 1.5)):
+    for moments in ((1.0, 1.0, 1.0), (1.0, 1.0, 1.5), (1.0, 1.5, 1.5), (1.5e-6, 1.0 - 5e-7, 1.0)):
         assert free_rotor(np.diag(moments), TILTED, np.array([1.0, 2.0, 3.0])).horizon == np.inf
 
 

@@ -39,12 +39,16 @@ same_speed = partial(math.isclose, rel_tol=1e-9)
 
 
 class Diagnosis(NamedTuple):
-    """A failure mode, the criterion that is met, the value that meets it, and a message."""
+    """A failure mode, the criterion that is met, the value that meets it, and a message.
+
+    The last attribute is the time up to which the motion was compared with the exact solution [s], if this ends before the motion.
+    """
 
     mode: FailureMode
     criterion: str
     size: float
     message: str
+    compared_until: float | None = None
 
 
 SOUND = Diagnosis("sound", "", 0.0, "")
@@ -87,7 +91,8 @@ def diagnose(motion: ExtendedMotion, within: float) -> Diagnosis:
             diagnoses += _tunnels(motion, motion.scene.floor)
             if not motion.scene.floor.ends:
                 diagnoses += [*_sinks(motion), *_never_rests(motion, whole)]
-    return worst(diagnoses)
+    is_whole = motion.truth is None or motion.truth.covers_all(motion.nominal.t[-1])
+    return worst(diagnoses)._replace(compared_until=None if motion.truth is None or is_whole else motion.truth.horizon)
 
 
 def _energy_gain(whole: Comparison) -> Iterator[Diagnosis]:

@@ -13,12 +13,13 @@ from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part
 from dropspin.reports.plots.run_charts import limits_charts
 from dropspin.reports.stories.numbers import duration, left_out
 from dropspin.reports.stories.study import Records, Study
+from dropspin.scenarios.text import counted
 
 ACCURATE_AND_STABLE = (
     "Accurate: the engine is sound at this time step and at all smaller ones that were tested. Stable: at all of these time steps, "
     "errors above the tolerance are the only failures."
 )
-COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterion", "size", "message")
+COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterion", "size", "message", "compared_until")
 
 
 class Limits(Study):
@@ -53,7 +54,7 @@ def _rows(study: LimitsStudy) -> Records:
     not_scanned = [engine for engine in study.refinements if engine not in scanned]
     points += [(engine, AXES["step"], point) for engine in not_scanned for point in study.steps(engine)]
     tested = [(name, engine, axis.name, point.value, axis.unit, *point.diagnosis) for engine, axis, point in points]
-    missing = [(name, engine, None, None, None, "missing", None, None, reason) for engine, reason in study.left_out.items()]
+    missing = [(name, engine, None, None, None, "missing", None, None, reason, None) for engine, reason in study.left_out.items()]
     return [dict(zip(COLUMNS, row, strict=True)) for row in [*tested, *missing]]
 
 
@@ -130,7 +131,21 @@ def sentences(study: LimitsStudy) -> list[str]:
         for point in _outside(scan)
         if point.mode == "crashed"
     ]
-    return [_refinement(engine, points) for engine, points in failing] + crashes + left_out(study.left_out)
+    return [_refinement(engine, points) for engine, points in failing] + crashes + _compared_in_part(study) + left_out(study.left_out)
+
+
+def _compared_in_part(study: LimitsStudy) -> list[str]:
+    """Sentences on the values of an axis at which the exact solution ends before the motion, so that later errors are not judged."""
+    found = []
+    for label in dict.fromkeys(scan.axis.label for scan in study.scans):
+        points = [point for scan in study.scans if scan.axis.label == label for point in scan.points]
+        ends = {point.value: until for point in points if (until := point.diagnosis.compared_until) is not None}
+        if ends:
+            where = f"{counted(len(ends), 'value', 'values')}, {min(ends):.4g} to {max(ends):.4g},"
+            earliest, latest = duration(min(ends.values())), duration(max(ends.values()))
+            ending = f"the exact solution ends before the motion, after {earliest} to {latest}; later errors are not judged"
+            found.append(f"Axis {label}: at {where} {ending}.")
+    return found
 
 
 def _refinement(engine: str, points: Sequence[ScanPoint]) -> str:

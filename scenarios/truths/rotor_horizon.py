@@ -49,7 +49,7 @@ def horizon(moments: tuple[float, ...], spin: tuple[Fraction, ...], rounding: Ar
     """
     Ia, Ib, Ic = map(Fraction, moments)
     P, Q = math.sqrt(abs(Ic * (Ic - Ib))), math.sqrt(abs(Ia * (Ib - Ia)))
-    if P * Q == 0.0:
+    if P * Q == 0.0 or not any(spin):
         return math.inf
     at_c, at_a = P * abs(float(spin[2])), Q * abs(float(spin[0]))
     if at_a > at_c:  # L circles c

@@ -14,7 +14,8 @@ from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.scenarios import truth_for
 
 TILTED = np.array([0.2, -0.3, 0.1, 0.9]) / np.linalg.norm([0.2, -0.3, 0.1, 0.9])
-LIMIT = r"compared up to t = 6\.8 s, where the exact solution ends: rounding of the initial state and of the moments of inertia determines"
+TURNS_OVER = "rounding of the initial state and of the moments of inertia determines when the body turns over"
+LIMIT = rf"compared up to t = 6\.8 s, where the exact solution ends: {TURNS_OVER}"
 
 
 def spinning(**changes):

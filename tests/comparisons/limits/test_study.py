@@ -5,6 +5,7 @@ The file is longer than 300 lines because its tests share the engines with fault
 
 import math
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -130,6 +131,14 @@ def moved(column, change):
 @pytest.mark.parametrize("name", SCENES)
 def test_the_exact_motion_is_sound(name):
     assert diagnose(motion_of(name), 0.1).mode == "sound"
+
+
+def test_time_until_which_a_motion_was_compared_is_kept():
+    """An error after the end of the exact solution is not seen, and this end is."""
+    late = motion_of("spin-principal", moved(4, lambda t, x: 0.1 * (t > 5)))
+    limited = late._replace(truth=replace(late.truth, horizon=4.0))
+    assert (diagnose(late, 0.1).mode, diagnose(late, 0.1).compared_until) == ("inaccurate", None)
+    assert (diagnose(limited, 0.1).mode, diagnose(limited, 0.1).compared_until) == ("sound", 4.0)
 
 
 HEIGHT, UPWARD = 1, 8

@@ -55,6 +55,21 @@ def test_tables_of_largest_steps_and_of_sound_ranges(study):
     }
 
 
+def test_values_at_which_the_exact_solution_ends_early_are_said(study):
+    """Of all engines, and with the times; the tables of values have the time of each."""
+    parts = [replace(one, points=tuple(_until(point, 2.0 * one.base / point.value) for point in one.points)) for one in study.scans[:2]]
+    found = replace(study, scans=(*parts, study.scans[2]))
+    [sentence] = [text for text in limits.sentences(found) if "exact solution" in text]
+    ends = "the exact solution ends before the motion, after 20 ms to 200 ms; later errors are not judged"
+    assert sentence == f"Axis spin [rad/s]: at 2 values, 10 to 100, {ends}."
+    rows = limits.Limits(scenes=[found]).rows()
+    assert [row["compared_until"] for row in rows if row["axis"] == "spin"] == [None, 0.2, 0.02] * 2
+
+
+def _until(point, time):
+    return replace(point, diagnosis=point.diagnosis._replace(compared_until=time if time < 1.0 else None))
+
+
 def test_data_of_a_chart_name_the_positions_along_its_axis(study):
     assert [plots.failure_modes(study, axis).x_name for axis in ("spin", "step")] == ["log of spin [rad/s]", "log of step [s]"]
 

@@ -152,16 +152,10 @@ def _is(numba_type: Any, kind: type) -> bool:
 
 def _register_operator(symbol: Callable[..., Any], source: Callable[..., Any], *kinds: type) -> None:
     """Make compiled code use `source` for the operator `symbol` on operands of these kinds."""
-    if len(kinds) == 1:
 
-        @overload(symbol, strict=False)
-        def unary(a):
-            return source if _is(a, kinds[0]) else None
-    else:
-
-        @overload(symbol, strict=False)
-        def binary(a, b):
-            return source if _is(a, kinds[0]) and _is(b, kinds[1]) else None
+    @overload(symbol, strict=False)
+    def of_operands(*operands):
+        return source if all(map(_is, operands, kinds)) else None
 
 
 for _symbol, _source, *_kinds in (

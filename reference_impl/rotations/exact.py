@@ -34,7 +34,7 @@ def turn(q, w, dt, body):
     if dot(torque, torque) <= PARALLEL * PARALLEL * dot(L, L) * dot(spin, spin):
         return normalise(product(product(q, _about(spin, dt)), conjugate(body.axes))), w
     a, b, c = _axes(I, spin)
-    sign = _parity(a, b)
+    sign = 1.0 if (b - a) % 3 == 1 else -1.0  # the third axis is reversed if b does not follow a in their cyclic order
     moments = Vec3(I[a], I[b], I[c])
     turned, after = _asymmetric_top(moments, Vec3(spin[a], spin[b], sign * spin[c]), dt)
     relative = Quat(_component(turned, a, b, 0, sign), _component(turned, a, b, 1, sign), _component(turned, a, b, 2, sign), turned.w)
@@ -69,12 +69,6 @@ def _axes(I, spin):
         low, middle = middle, low
     beyond = I[high] * (I[high] - I[middle]) * _square(spin[high]) - I[low] * (I[middle] - I[low]) * _square(spin[low])
     return (low, middle, high) if beyond >= 0.0 else (high, middle, low)
-
-
-@compiled
-def _parity(a, b):
-    """+1 if b follows a in the cyclic order of the axes, else -1, in which case the third axis is reversed."""
-    return 1.0 if (b - a) % 3 == 1 else -1.0
 
 
 @compiled

@@ -26,15 +26,17 @@ from numba.core import config as numba_config
 from dropspin.reference_impl import sources
 from dropspin.reference_impl.methods import COLLIDE, LAWS, ROTATIONS, Methods
 from dropspin.reference_impl.parameters import (
+    DAMPING,
+    FLOOR,
+    GRAVITY,
+    SEMI_AXES,
     STEP_SIZE,
     read_body,
     read_damping,
-    read_floor,
     read_floor_with_edges,
-    read_gravity,
     read_nothing,
     read_quaternion,
-    read_semi_axes,
+    read_surface,
     read_vector,
 )
 from dropspin.reference_impl.step import advance
@@ -64,28 +66,29 @@ class Parts:
 @cache
 def recording_kernel(methods: Methods, parts: Parts) -> Callable[..., int]:
     """The loop that records each `every`-th state of some bodies, and counts the steps whose contact did not converge."""
-    gravity_of = read_gravity if parts.gravity else read_nothing
+    gravity_of = read_vector if parts.gravity else read_nothing
     damping_of = read_damping if parts.damping else read_nothing
-    floor_of = (read_floor_with_edges if parts.edges else read_floor) if parts.floor else read_nothing
+    floor_of = (read_floor_with_edges if parts.edges else read_surface) if parts.floor else read_nothing
     turn = ROTATIONS[methods.rotation].turn if parts.turning else None
     touches = parts.floor or parts.walls > 0  # otherwise methods that differ in contacts alone have one kernel
     used = parts.turning and methods.rotation, touches and (methods.contact, methods.law), parts
     law = LAWS[methods.law].impulse if touches else None
     collide = COLLIDE[methods.contact][methods.law] if touches else None
-    walls_of, wall_count = _walls_of if parts.walls else _no_walls, parts.walls
-    forces_of = _of_body if parts.forces else _none_of_body
-    many_points_of = _of_body if parts.many_points else _none_of_body
-    semi_axes_of, has_rims = read_semi_axes if parts.ellipsoids else read_nothing, parts.rims
+    walls_of, wall_count = _walls_of if parts.walls else read_nothing, parts.walls
+    forces_of = _of_body if parts.forces else read_nothing
+    many_points_of = _of_body if parts.many_points else read_nothing
+    semi_axes_of, has_rims = read_vector if parts.ellipsoids else read_nothing, parts.rims
 
     def fill(recorded, states, columns, points, many_points, forces, every, first, last):
         unsolved = 0
         for number in range(first, last):
             numbers = columns[min(number, columns.shape[0] - 1)]
-            body = read_body(numbers, _of_body(points, number), semi_axes_of(numbers), has_rims, many_points_of(many_points, number))
+            semi_axes = semi_axes_of(numbers, SEMI_AXES)
+            body = read_body(numbers, _of_body(points, number), semi_axes, has_rims, many_points_of(many_points, number))
             dt = float(numbers[STEP_SIZE])
-            gravity = gravity_of(numbers)
-            damping = damping_of(numbers)
-            floor = floor_of(numbers)
+            gravity = gravity_of(numbers, GRAVITY)
+            damping = damping_of(numbers, DAMPING)
+            floor = floor_of(numbers, FLOOR)
             walls = walls_of(numbers, wall_count)
             on_vertices = forces_of(forces, number)
             start = states[number]
@@ -112,19 +115,9 @@ def _walls_of(numbers, count):
 
 
 @compiled
-def _no_walls(numbers, count):
-    return None
-
-
-@compiled
 def _of_body(array, number):
     """The part of an array that belongs to a body; the last one may be shared."""
     return array[min(number, array.shape[0] - 1)]
-
-
-@compiled
-def _none_of_body(array, number):
-    return None
 
 
 @compiled

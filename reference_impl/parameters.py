@@ -177,33 +177,15 @@ def read_body(columns, points, semi_axes, has_rims, many_points):
 
 
 @compiled
-def read_semi_axes(columns):
-    """The semi-axes about each vertex [m]."""
-    return read_vector(columns, SEMI_AXES)
-
-
-@compiled
-def read_gravity(columns):
-    """Gravity [m/s²]."""
-    return read_vector(columns, GRAVITY)
-
-
-@compiled
-def read_damping(columns):
+def read_damping(columns, first):
     """Algorithm 1's damping factors."""
-    return KernelDamping(float(columns[DAMPING]), float(columns[DAMPING + 1]))
+    return KernelDamping(float(columns[first]), float(columns[first + 1]))
 
 
 @compiled
-def read_floor(columns):
-    """A floor without an end."""
-    return _read_surface(columns, FLOOR)
-
-
-@compiled
-def read_floor_with_edges(columns):
+def read_floor_with_edges(columns, first):
     """A floor that ends."""
-    endless = _read_surface(columns, FLOOR)
+    endless = read_surface(columns, first)
     half_extents = (float(columns[EDGES]), float(columns[EDGES + 1]))
     return Floor(endless.restitution, endless.friction, endless.rest_speed, half_extents, float(columns[EDGES + 2]))
 
@@ -216,12 +198,13 @@ def read_wall(columns, number):
         _read_matrix(columns, first + 3),
         read_quaternion(columns, first + 12),
         float(columns[first + 16]),
-        _read_surface(columns, first),
+        read_surface(columns, first),
     )
 
 
 @compiled
-def _read_surface(columns, first):
+def read_surface(columns, first):
+    """A wall's surface, or a floor without an end."""
     return Floor(float(columns[first]), float(columns[first + 1]), float(columns[first + 2]), None, None)
 
 
@@ -243,6 +226,6 @@ def _read_matrix(columns, first):
 
 
 @compiled
-def read_nothing(columns):
-    """A value for a part that the world does not have."""
+def read_nothing(values, place):
+    """A value for a part that the world or the body does not have."""
     return None

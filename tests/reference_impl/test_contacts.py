@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from dropspin import reference_impl
 from dropspin.reference_impl import Body, Floor, Methods, World
 from dropspin.reference_impl.floor_plane import contact_count, contact_offset
-from dropspin.reference_impl.parameters import pack, read_body, read_semi_axes
+from dropspin.reference_impl.parameters import SEMI_AXES, pack, read_body, read_vector
 from dropspin.reference_impl.quaternion import rotation_matrix
 from dropspin.reference_impl.state import ORIENTATION, SPIN, VELOCITY
 from dropspin.reference_impl.vectors import Quat
@@ -192,7 +192,7 @@ def test_corner_of_a_body_of_any_size_strikes_when_it_reaches_the_floor(half):
 def test_points_of_a_rim_divide_it_into_three_from_the_lowest():
     """Of a cylinder at random orientations: on the rim, 120° apart, the first as low as the disc is; of a level disc too."""
     packed = pack(Body(1.0, np.eye(3), np.array([[0.0, -0.3, 0.0], [0.0, 0.3, 0.0]]), (0.2, 0.0, 0.2)), World(), 1.0)
-    body = read_body(packed.columns[0], packed.points[0], read_semi_axes(packed.columns[0]), True, None)
+    body = read_body(packed.columns[0], packed.points[0], read_vector(packed.columns[0], SEMI_AXES), True, None)
     assert contact_count(body) == 6
     for q in (np.array([0.0, 0.0, 0.0, 1.0]), *np.random.default_rng(2).normal(size=(5, 4))):
         R = rotation_matrix(Quat(*(q / np.linalg.norm(q)).tolist()))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -37,14 +38,12 @@ class Trajectory:
     def from_states(cls, t: Array, states: Array, velocity_lag: float = 0.0) -> Self:
         """A trajectory from states (position, orientation, velocity, angular velocity), shape (n, 13), without copying them."""
         motion = cls(t, states[:, POSITION], states[:, ORIENTATION], states[:, VELOCITY], states[:, SPIN], velocity_lag)
-        vars(motion)["_states"] = states
+        vars(motion)["states"] = states
         return motion
 
-    @property
+    @cached_property
     def states(self) -> Array:
         """All states, shape (n, 13)."""
-        if (whole := vars(self).get("_states")) is not None:
-            return whole
         return np.hstack([self.position, self.orientation, self.velocity, self.angular_velocity])
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Array, Array, float]]:
@@ -71,10 +70,7 @@ class Trajectory:
 
     def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Self:
         """The motion at some of its times."""
-        if (whole := vars(self).get("_states")) is not None:
-            return self.from_states(self.t[rows], whole[rows], self.velocity_lag)
-        position, orientation = self.position[rows], self.orientation[rows]
-        return type(self)(self.t[rows], position, orientation, self.velocity[rows], self.angular_velocity[rows], self.velocity_lag)
+        return self.from_states(self.t[rows], self.states[rows], self.velocity_lag)
 
     @property
     def first_bad_row(self) -> int | None:

@@ -35,11 +35,12 @@ def members(scene: Scenario) -> list[Scenario]:
     angles = _angles(random.random(spread.size), spread.turn)
     rates = random.uniform(-1.0, 1.0, size=(spread.size, 6)) * np.array([*spread.velocity, *spread.angular_velocity])
     starts = np.tile(scene.initial_state, (spread.size, 1))
+    starts[:, RATES] += rates
     for start, axis, angle in zip(starts, axes, angles, strict=True):
         start[ORIENTATION] = multiply(about(axis / np.linalg.norm(axis), np.array(angle)), start[ORIENTATION])
-    starts[:, RATES] += rates
-    drawn = [scene.starting_at(start) for start in starts]
-    return [member.starting_at(_at_clearance_of(member, scene)) for member in drawn] if scene.floor is not None else drawn
+        if scene.floor is not None:
+            start[1] += scene.clearance - scene.starting_at(start).clearance
+    return [scene.starting_at(start) for start in starts]
 
 
 def spread_start(scene: Scenario, number: int) -> Array:
@@ -52,15 +53,9 @@ def spread_start(scene: Scenario, number: int) -> Array:
     """
     if scene.ensemble is None:
         raise ValueError(f"scene {scene.name!r} has no [ensemble]")
-    body = scene.body
-    return spread_starts(
-        scene.initial_state[np.newaxis],
-        scene.ensemble,
-        np.array([number]),
-        body.vertices,
-        body.semi_axes,
-        scene.floor is not None,
-    )[0]
+    body, has_floor = scene.body, scene.floor is not None
+    states, numbers = scene.initial_state[np.newaxis], np.array([number])
+    return spread_starts(states, scene.ensemble, numbers, body.vertices, body.semi_axes, has_floor)[0]
 
 
 def spread_starts(states: Array, spread: Ensemble, numbers: NDArray[np.int64], vertices: Array, semi_axes: Array, floor: bool) -> Array:
@@ -120,13 +115,6 @@ def _shares(largest: float) -> tuple[Array, Array]:
 def _angle_minus_sine(angle: float, unit: float) -> float:
     """Θ - sin θ in units of unit³/6, by its series, because the difference would lose all digits."""
     return (angle / unit) ** 3 * (1.0 - angle**2 / 20.0 * (1.0 - angle**2 / 42.0 * (1.0 - angle**2 / 72.0)))
-
-
-def _at_clearance_of(member: Scenario, scene: Scenario) -> Array:
-    """The initial state of a member, moved vertically so that it has the clearance of the scene."""
-    start = member.initial_state
-    start[1] += scene.clearance - member.clearance
-    return start
 
 
 def uniform(seed: int, purpose: str, numbers: NDArray[np.int64]) -> NDArray[np.float64]:

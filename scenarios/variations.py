@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from dropspin.scenarios.bodies.shape import times
+from dropspin.scenarios.field_types import Table
 from dropspin.scenarios.loading import from_mapping
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, turned_states
@@ -85,29 +86,18 @@ def with_inertia_ratio(scene: Scenario, ratio: float) -> Scenario:
 
 def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: float = 1.0) -> Scenario:
     """The scene in other units; the arguments are a metre, a second and a kilogram in these units."""
-    start, speed = scene.start, length / time
-    tables: dict[str, Tables] = {
-        "wall": _walls(scene, lambda wall: {"point": times(length, wall.point), "rest_speed": speed * wall.rest_speed}),
-        "body": scene.body.scaled(length, mass),
-        "start": {
-            "position": times(length, start.position),
-            "velocity": times(speed, start.velocity),
-            "angular_velocity": times(1.0 / time, start.angular_velocity),
-        },
-    }
-    if scene.gravity is not None:
-        tables["gravity"] = {"acceleration": times(length / time**2, scene.gravity.acceleration)}
-    if scene.floor is not None:
-        ends = {"half_extents": scene.floor.half_extents, "thickness": scene.floor.thickness} if scene.floor.ends else {}
-        ends = {name: times(length, end) for name, end in ends.items() if end is not None}
-        tables["floor"] = {"rest_speed": speed * scene.floor.rest_speed} | ends
+    units = dict.fromkeys(("position", "point", "half_extents", "thickness"), length)
+    units |= dict.fromkeys(("velocity", "rest_speed"), length / time)
+    units |= {"angular_velocity": 1.0 / time, "acceleration": length / time**2}
+
+    def converted(table: Table) -> dict[str, Any]:
+        return {key: times(units[key], value) for key, value in table.model_dump(exclude_none=True).items() if key in units}
+
+    tables: dict[str, Tables] = {"body": scene.body.scaled(length, mass), "wall": _walls(scene, converted)}
+    tables |= {name: converted(table) for name in ("start", "gravity", "floor") if (table := getattr(scene, name)) is not None}
     if scene.damping is not None:
         step = scene.damping.factor_dt
-        tables["damping"] = {
-            "linear": scene.damping.linear / time,
-            "angular": scene.damping.angular / time,
-            "factor_dt": step and time * step,
-        }
+        tables["damping"] = {name: rate / time for name, rate in scene.damping.rates.items()} | {"factor_dt": step and time * step}
     return changed(scene, time * scene.duration, **tables)
 
 
@@ -118,16 +108,13 @@ def with_other_numbers(scene: Scenario, share: float) -> Scenario:
         friction = surface.friction if isinstance(surface.friction, str) else share * surface.friction
         return {"restitution": surface.restitution / share, "friction": friction, "rest_speed": share * surface.rest_speed}
 
-    tables: dict[str, Tables] = {
-        "body": scene.body.scaled(1.0 / share, share),
-        "wall": _walls(scene, other),
-    }
+    tables: dict[str, Tables] = {"body": scene.body.scaled(1.0 / share, share), "wall": _walls(scene, other)}
     if scene.gravity is not None:
         tables["gravity"] = {"acceleration": times(share, scene.gravity.acceleration)}
     if scene.floor is not None:
         tables["floor"] = other(scene.floor)
     if scene.damping is not None:
-        tables["damping"] = {"linear": share * scene.damping.linear, "angular": share * scene.damping.angular}
+        tables["damping"] = {name: share * rate for name, rate in scene.damping.rates.items()}
     return changed(scene, scene.duration, **tables)
 
 

@@ -287,12 +287,7 @@ def differ_in_start_alone(scenes: Sequence[Scenario]) -> bool:
 
 
 def initial_states(scenes: Sequence[Scenario]) -> Array:
-    """The states of many scenes at t = 0, shape (size, 13): in a third of the time of `initial_state` for each."""
-    numbers: list[float] = []
-    for scene in scenes:
-        start = scene.start
-        numbers += start.position
-        numbers += start.orientation
-        numbers += start.velocity
-        numbers += start.angular_velocity
-    return np.fromiter(numbers, float, len(numbers)).reshape(-1, 13)
+    """The states of many scenes at t = 0, shape (size, 13): in half of the time of `initial_state` for each."""
+    starts = (scene.start for scene in scenes)
+    states = [(*start.position, *start.orientation, *start.velocity, *start.angular_velocity) for start in starts]
+    return np.array(states, dtype=float).reshape(-1, 13)

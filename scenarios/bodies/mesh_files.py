@@ -88,6 +88,4 @@ def _stl(raw: bytes) -> tuple[Array, Faces]:
     corners = np.concatenate([np.empty((0, 3)), *(np.asarray(solid["vertices"], dtype=float) for solid in solids)])
     points, first, which = np.unique(corners, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
-    place = np.empty(len(order), dtype=np.int64)
-    place[order] = np.arange(len(order))
-    return points[order], place[which].reshape(-1, 3)
+    return points[order], np.argsort(order)[which].reshape(-1, 3)

@@ -28,13 +28,9 @@ class Surface(Table):
         return {"none": 0.0, "infinite": math.inf}[self.friction] if isinstance(self.friction, str) else self.friction
 
     @model_validator(mode="after")
-    def _no_friction_is_none(self) -> Self:
+    def _law_has_friction(self) -> Self:
         if self.friction == 0.0:
             object.__setattr__(self, "friction", "none")
-        return self
-
-    @model_validator(mode="after")
-    def _law_has_friction(self) -> Self:
         if self.impact_law != "cone" and isinstance(self.friction, str):
             raise ValueError(f"impact_law is {self.impact_law!r}, which needs a coefficient of friction; friction is {self.friction!r}")
         return self

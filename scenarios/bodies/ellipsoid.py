@@ -72,15 +72,12 @@ class Ellipsoid(Shape):
 
         Source: B. C. Carlson, Elliptic integrals, DLMF 19.16.3 (R_G as the mean of w) and 19.16.5 (R_D).
         """
-        if distribution == "surface":
-            return self._tensor_of_surface()
-        a, b, c = np.square(self.half_extents)
-        return 0.2 * self.mass * np.diag([b + c, c + a, a + b])
-
-    def _tensor_of_surface(self) -> Array:
+        squares = np.square(self.half_extents)
+        if distribution == "solid":
+            a, b, c = squares
+            return 0.2 * self.mass * np.diag([b + c, c + a, a + b])
         from scipy.special import elliprd, elliprf, elliprg
 
-        squares = np.square(self.half_extents)
         x, y, z = 1.0 / squares
         inverse = 0.5 * (elliprf(x, y, z) - np.array([x * elliprd(y, z, x), y * elliprd(z, x, y), z * elliprd(x, y, z)]) / 3.0)
         means = 0.25 * (squares + inverse / elliprg(x, y, z))

@@ -112,12 +112,9 @@ def rocking(scene: Scenario, floor: Floor) -> Truth | None:
         return Truth("tipping", PENDULUM, states, horizon=scene.duration)
     if floor.restitution > 0.0:
         return Truth("tipping", PENDULUM, states, horizon=falls[0].lands, ends="the body lands on a face and rebounds")
-    impacts = _impacts(scene, stand, ladder)
-    if np.ptp([fall.edge for fall in falls]) > 1:
-        statement = f"{PENDULUM}; each landing conserves the angular momentum about the new edge (McGeer 1990)"
-        return Truth("rimless-wheel", statement, states, impacts, ladder.horizon, ladder.ends)
-    statement = f"{PENDULUM}; each landing conserves the angular momentum about the new edge (Housner 1963)"
-    return Truth("rocking", statement, states, impacts, ladder.horizon, ladder.ends)
+    name, source = ("rimless-wheel", "McGeer 1990") if np.ptp([fall.edge for fall in falls]) > 1 else ("rocking", "Housner 1963")
+    statement = f"{PENDULUM}; each landing conserves the angular momentum about the new edge ({source})"
+    return Truth(name, statement, states, _impacts(scene, stand, ladder), ladder.horizon, ladder.ends)
 
 
 def _pivots(scene: Scenario, stand: Stand) -> bool:

@@ -69,16 +69,6 @@ class Stand:
         """R of the edge on which it stands [m]."""
         return float(self.radii[0])
 
-    @property
-    def share(self) -> float:
-        """The k of this edge."""
-        return float(self.shares[0])
-
-    @property
-    def flat(self) -> float:
-        """The angle at this edge when the face ahead lies on a floor [rad]."""
-        return float(self.ahead[0])
-
 
 def on_one_edge(scene: Scenario) -> Stand | None:
     """The stand of a scene's body; None if one edge does not carry it, or if it would leave the plane across this edge.

@@ -42,8 +42,8 @@ def slipping(scene: Scenario, floor: Floor) -> Truth | None:
     falling = stand.speed * stand.radius * math.sin(stand.angle)
     if abs(scene.initial_state[8] + falling) > TOUCHING * abs(falling):
         return None
-    at_start, at_end = math.sin(0.5 * stand.angle) ** 2, math.sin(0.5 * stand.flat) ** 2
-    level = at_start - 0.25 * (stand.share + math.sin(stand.angle) ** 2) * stand.radius / stand.gravity * stand.speed**2
+    at_start, at_end = math.sin(0.5 * stand.angle) ** 2, math.sin(0.5 * stand.ahead[0]) ** 2
+    level = at_start - 0.25 * (stand.shares[0] + math.sin(stand.angle) ** 2) * stand.radius / stand.gravity * stand.speed**2
     if level < MIN_LEVEL or (stand.speed < 0.0 < stand.behind[0]):
         return None
     since_rest = _time_since_rest(stand, level, at_end)
@@ -67,7 +67,7 @@ def slipping(scene: Scenario, floor: Floor) -> Truth | None:
 def _pace(stand: Stand, level: float, u: Array) -> Array:
     """dt/du [s]."""
     square = level * np.cosh(u) ** 2
-    return np.sqrt((stand.share + 4.0 * square * (1.0 - square)) * stand.radius / (stand.gravity * (1.0 - square)))
+    return np.sqrt((stand.shares[0] + 4.0 * square * (1.0 - square)) * stand.radius / (stand.gravity * (1.0 - square)))
 
 
 def _time_since_rest(stand: Stand, level: float, at_end: float) -> Chebyshev:

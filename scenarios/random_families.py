@@ -53,13 +53,13 @@ def ball(draws: Draws) -> Drawn:
     if draws.happens(0.5):
         body["inertia"] = _moments(draws, body["mass"], [body["radius"]] * 3)
     impacts = 1 + draws.one_of(3)
-    scene = _fall(draws, body, draws.direction(4), draws.log_uniform(0.5, 12.0) * draws.direction(), impacts, may_tilt=True)
+    scene = _fall(draws, body, draws.direction(4), _spin(draws), impacts, may_tilt=True)
     return scene | _floor(draws, "none"), impacts
 
 
 def rough_ball(draws: Draws) -> Drawn:
     """A spinning ball strikes a rough floor."""
-    scene = _fall(draws, _ball(draws), draws.direction(4), draws.log_uniform(0.5, 12.0) * draws.direction(), may_tilt=True)
+    scene = _fall(draws, _ball(draws), draws.direction(4), _spin(draws), may_tilt=True)
     return scene | _floor(draws, "infinite" if draws.happens(0.5) else draws.uniform(0.05, 0.6)), 1
 
 
@@ -72,17 +72,14 @@ def flat_box(draws: Draws) -> Drawn:
 
 def corner(draws: Draws) -> Drawn:
     """A body lands on a corner."""
-    body = _points(draws) if draws.happens(1.0 / 3.0) else _box(draws)
-    scene = _fall(draws, body, draws.direction(4), draws.uniform(0.0, 3.0) * draws.direction(), may_tilt=True)
-    return scene | _floor(draws, "infinite" if draws.happens(0.5) else "none"), 1
+    return _struck(draws, _points(draws) if draws.happens(1.0 / 3.0) else _box(draws))
 
 
 def edge(draws: Draws) -> Drawn:
     """A box lands on an edge."""
     tilt = about(np.eye(3)[0], np.array(draws.uniform(0.1, 0.5 * math.pi - 0.1)))
-    attitude = multiply(about(UP, np.array(draws.uniform(0.0, 2.0 * math.pi))), multiply(tilt, FACES[draws.one_of(3)]))
-    scene = _fall(draws, _box(draws), attitude, np.zeros(3))
-    return scene | _floor(draws, "infinite" if draws.happens(0.5) else "none"), 1
+    attitude = multiply(_yaw(draws), multiply(tilt, FACES[draws.one_of(3)]))
+    return _fall(draws, _box(draws), attitude, np.zeros(3)) | _floor(draws), 1
 
 
 def on_floor(draws: Draws) -> Drawn:
@@ -108,22 +105,21 @@ def standing(draws: Draws) -> Drawn:
     height, depth = (body["half_extents"][axis] for axis in (1, 2))
     balance = math.atan2(depth, height)  # turned by this about its own x axis, the box balances on an edge
     turned = balance + math.copysign(draws.uniform(0.05, 0.3), draws.uniform(-1.0, 1.0))
-    attitude = multiply(about(UP, np.array(draws.uniform(0.0, 2.0 * math.pi))), about(np.eye(3)[0], np.array(turned)))
+    attitude = multiply(_yaw(draws), about(np.eye(3)[0], np.array(turned)))
     scene = _content(1.2, body, draws.log_uniform(*GRAVITY) * DOWN, position=_height(body, attitude) * UP, orientation=attitude)
     return scene | {"floor": {"restitution": 0.0, "friction": "infinite" if draws.happens(0.5) else "none"}}, 0
 
 
 def strike(draws: Draws) -> Drawn:
     """A round body lands on a point."""
-    scene = _fall(draws, _round(draws), draws.direction(4), draws.uniform(0.0, 3.0) * draws.direction(), may_tilt=True)
-    return scene | _floor(draws, "infinite" if draws.happens(0.5) else "none"), 1
+    return _struck(draws, _round(draws))
 
 
 def lying(draws: Draws) -> Drawn:
     """A round body lands on its side."""
     body, impacts = _round(draws), 1 + draws.one_of(3)
     down = 2 if "radius" in body else int(np.argmin(body["half_extents"]))
-    attitude = multiply(about(UP, np.array(draws.uniform(0.0, 2.0 * math.pi))), FACES[down - 1])
+    attitude = multiply(_yaw(draws), FACES[down - 1])
     scene = _fall(draws, body, attitude, draws.uniform(-10.0, 10.0) * UP, impacts)
     return scene | _floor(draws, "none"), impacts
 
@@ -132,7 +128,7 @@ def rolling(draws: Draws) -> Drawn:
     """A round body slides until it rolls."""
     body = _ball(draws) if draws.happens(1.0 / 3.0) else _on_axis(draws)
     g, friction, rolls = draws.log_uniform(*GRAVITY), draws.uniform(0.1, 0.6), draws.uniform(0.2, 0.6)
-    turned = about(UP, np.array(draws.uniform(0.0, 2.0 * math.pi)))
+    turned = _yaw(draws)
     speed = friction * g * rolls * (1.0 + body["mass"] * body["radius"] ** 2 / body_of(body).moments[1])
     attitude, velocity = multiply(turned, FACES[1]), speed * rotate(turned, np.eye(3)[0])
     scene = _content(1.5 * rolls, body, g * DOWN, position=body["radius"] * UP, orientation=attitude, velocity=velocity)
@@ -143,15 +139,13 @@ def mesh(draws: Draws) -> Drawn:
     """A mesh lands on a corner."""
     points = 0.5 * draws.log_uniform(*LENGTH) * draws.normal(4)
     faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
-    body = {"shape": "mesh", "mass": draws.log_uniform(*MASS), "points": points.tolist(), "faces": faces}
-    scene = _fall(draws, body, draws.direction(4), draws.uniform(0.0, 3.0) * draws.direction(), may_tilt=True)
-    return scene | _floor(draws, "infinite" if draws.happens(0.5) else "none"), 1
+    return _struck(draws, {"shape": "mesh", "mass": draws.log_uniform(*MASS), "points": points.tolist(), "faces": faces})
 
 
 def wall(draws: Draws) -> Drawn:
     """A ball strikes a wall and the floor."""
     body = _ball(draws)
-    scene = _fall(draws, body, draws.direction(4), draws.log_uniform(0.5, 12.0) * draws.direction(), 2) | _floor(draws, "none")
+    scene = _fall(draws, body, draws.direction(4), _spin(draws), 2) | _floor(draws, "none")
     velocity = np.array(scene["start"]["velocity"]) * (1.0 - UP)
     heading = rotate(about(UP, np.array(draws.uniform(-0.5, 0.5))), velocity / np.linalg.norm(velocity))
     struck = draws.uniform(0.3, 0.7) * (scene["duration"] - 2.0 * FLIGHT_TIME)
@@ -219,7 +213,7 @@ def _content(duration: float, body: Table, gravity: Array | None, **start: Array
 
 def _flight(draws: Draws, body: Table) -> Table:
     attitude, velocity = draws.direction(4), draws.uniform(0.0, 3.0) * draws.direction()
-    spin = draws.log_uniform(0.5, 12.0) * draws.direction()
+    spin = _spin(draws)
     gravity = None if draws.happens(0.3) else draws.log_uniform(*GRAVITY) * draws.direction()
     return _content(draws.uniform(0.5, 1.0), body, gravity, orientation=attitude, velocity=velocity, angular_velocity=spin)
 
@@ -239,13 +233,30 @@ def _fall(
     return _content(time + impacts * FLIGHT_TIME, body, gravity, **start)
 
 
-def _floor(draws: Draws, friction: str | float) -> Table:
+def _struck(draws: Draws, body: Table) -> Drawn:
+    """A fall from any orientation, with one impact."""
+    scene = _fall(draws, body, draws.direction(4), draws.uniform(0.0, 3.0) * draws.direction(), may_tilt=True)
+    return scene | _floor(draws), 1
+
+
+def _floor(draws: Draws, friction: str | float | None = None) -> Table:
+    """A floor, by default with infinite friction or none."""
+    friction = ("infinite" if draws.happens(0.5) else "none") if friction is None else friction
     return {"floor": {"restitution": draws.uniform(*RESTITUTION), "friction": friction}}
+
+
+def _yaw(draws: Draws) -> Array:
+    """A rotation about the vertical."""
+    return about(UP, np.array(draws.uniform(0.0, 2.0 * math.pi)))
+
+
+def _spin(draws: Draws) -> Array:
+    return draws.log_uniform(0.5, 12.0) * draws.direction()
 
 
 def _flat(draws: Draws) -> Array:
     """An orientation of a box with a face down."""
-    return multiply(about(UP, np.array(draws.uniform(0.0, 2.0 * math.pi))), FACES[draws.one_of(3)])
+    return multiply(_yaw(draws), FACES[draws.one_of(3)])
 
 
 def _height(body: Table, attitude: Array) -> float:

@@ -51,12 +51,8 @@ class Methods:
     contact: str = "mean"
 
     def __post_init__(self) -> None:
-        for place, chosen, known in (
-            ("rotation", self.rotation, list(ROTATIONS)),
-            ("law", self.law, list(LAWS)),
-            ("contact", self.contact, list(CONTACTS)),
-        ):
-            if chosen not in known:
+        for place, known in (("rotation", list(ROTATIONS)), ("law", list(LAWS)), ("contact", list(CONTACTS))):
+            if (chosen := getattr(self, place)) not in known:
                 raise ValueError(f"{place}: got {chosen!r}; must be one of {', '.join(known)}")
         if self.law not in COLLIDE[self.contact]:
             laws = ", ".join(COLLIDE[self.contact])

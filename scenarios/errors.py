@@ -44,10 +44,4 @@ def verify_known(kind: str, names: Iterable[str], known: Collection[str]) -> Non
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """' Did you mean …?' with the nearest known name, or an empty string."""
-    meant = nearest(name, known)
-    return f" Did you mean {meant!r}?" if meant else ""
-
-
-def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The nearest known name; None if none is near."""
-    return next(iter(difflib.get_close_matches(name, list(known), n=1, cutoff=0.55)), None)
+    return "".join(f" Did you mean {meant!r}?" for meant in difflib.get_close_matches(name, list(known), n=1, cutoff=0.55))

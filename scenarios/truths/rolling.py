@@ -21,6 +21,7 @@ contact does not separate.
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import accumulate
 
 import numpy as np
 
@@ -144,10 +145,8 @@ def _integrated(start: Array, spins: Motion, kink: float, end: float) -> Callabl
     sides = [(first, last) for first, last in ((0.0, kink), (kink, end)) if last > first]
     grids = [np.linspace(first, last, 2 + math.ceil((last - first) * fastest / STEP)) for first, last in sides]
     nodes = np.concatenate([grids[0], *(grid[1:] for grid in grids[1:])])
-    orientations = [start]
-    for turn in _turns(spins, nodes[:-1], nodes[1:]):
-        orientations.append(multiply(turn, orientations[-1]))
-    at_nodes = np.array(orientations)
+    turns = _turns(spins, nodes[:-1], nodes[1:])
+    at_nodes = np.array(list(accumulate(turns, lambda before, turn: multiply(turn, before), initial=start)))
 
     def orientations_at(t: Array) -> Array:
         before = np.minimum(piece(nodes, t), len(nodes) - 2)

@@ -179,9 +179,7 @@ def _make_room(folder: Path) -> None:
 
 def _fingerprint(other_sources: tuple[Path, ...]) -> str:
     """A hash of all source files, of the compilers' versions, of the processor, and of the settings that change what they compile."""
-    digest = hashlib.sha256(f"{sources.HASH} {numba.__version__} {llvmlite.__version__} {get_host_cpu_name()}".encode())
-    for source in other_sources:
-        digest.update(source.read_bytes())
-    for name in COMPILER_SETTINGS:
-        digest.update(f"{name}={getattr(config, name, None)}".encode())
-    return digest.hexdigest()[:16]
+    compilers = f"{sources.HASH} {numba.__version__} {llvmlite.__version__} {get_host_cpu_name()}"
+    settings = "".join(f"{name}={getattr(config, name, None)}" for name in COMPILER_SETTINGS)
+    parts = [compilers.encode(), *(source.read_bytes() for source in other_sources), settings.encode()]
+    return hashlib.sha256(b"".join(parts)).hexdigest()[:16]

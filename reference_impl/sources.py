@@ -8,12 +8,5 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parent
 
-
-def _hash_of_sources() -> str:
-    digest = hashlib.sha256()
-    for source in sorted(PACKAGE.rglob("*.py")):
-        digest.update(str(source.relative_to(PACKAGE)).encode() + b"\0" + source.read_bytes())
-    return digest.hexdigest()
-
-
-HASH = _hash_of_sources()
+_named = (str(source.relative_to(PACKAGE)).encode() + b"\0" + source.read_bytes() for source in sorted(PACKAGE.rglob("*.py")))
+HASH = hashlib.sha256(b"".join(_named)).hexdigest()

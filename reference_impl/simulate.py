@@ -107,10 +107,12 @@ class Simulator:
     """
 
     def __init__(self, body: Body, world: World, dt: float | Array, methods: Methods | None = None) -> None:
-        self._methods = methods or Methods()
+        self._methods = methods = methods or Methods()
         self._parameters = pack(body, world, dt)
         for friction in frictions(world):
-            _assert_law_fits(self._methods, friction)
+            between = np.extract((friction > 0.0) & np.isfinite(friction), friction)
+            if len(between) and not methods.takes_any_friction:
+                raise ValueError(f"friction: got {between[0]:g}; law {methods.law!r} takes 0 and infinity only; use law='coulomb'")
         self._world = world
         columns, points, _ = self._parameters
         semi_axes = columns[:, SEMI_AXES : SEMI_AXES + 3]
@@ -177,12 +179,6 @@ def _whole(name: str, value: int, least: int) -> int:
     if not least <= number < 2**62:
         raise ValueError(f"{name}: got {value!r}; must be a whole number, at least {least}")
     return number
-
-
-def _assert_law_fits(methods: Methods, friction: Array) -> None:
-    between = np.extract((friction > 0.0) & np.isfinite(friction), friction)
-    if len(between) and not methods.takes_any_friction:
-        raise ValueError(f"friction: got {between[0]:g}; law {methods.law!r} takes 0 and infinity only; use law='coulomb'")
 
 
 def _can_fall_without_turning(body: Body, world: World) -> bool:

@@ -19,7 +19,7 @@ import numpy as np
 from dropspin.reference_impl.contacts.response import impulse_response
 from dropspin.reference_impl.floor_plane import along_normal, contact_count, contact_offset, is_below
 from dropspin.reference_impl.quaternion import rotation_matrix
-from dropspin.reference_impl.vectors import Vec3, compiled, cross, transpose
+from dropspin.reference_impl.vectors import Vec3, compiled, cross, row, transpose
 
 ORDER = None
 
@@ -52,7 +52,7 @@ def _sweep(x, q, v, w, body, floor, friction):
             if is_below(x, r, floor):
                 approach = along_normal(v0 + cross(w0, r))
                 mu = 0.0 if abs(approach) < floor.rest_speed else floor.restitution
-                j = Vec3(float(impulses[i, 0]), float(impulses[i, 1]), float(impulses[i, 2]))
+                j = row(impulses, i)
                 K = impulse_response(r, I_inverse, body.mass)
                 more = _improve(j, K, v + cross(w, r), max(-mu * approach, 0.0), friction)
                 change = more - j

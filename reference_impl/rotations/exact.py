@@ -34,7 +34,8 @@ def turn(q, w, dt, body):
     if dot(torque, torque) <= PARALLEL * PARALLEL * dot(L, L) * dot(spin, spin):
         return normalise(product(product(q, _about(spin, dt)), conjugate(body.axes))), w
     a, b, c = _axes(I, spin)
-    sign = 1.0 if (b - a) % 3 == 1 else -1.0  # the third axis is reversed if b does not follow a in their cyclic order
+    # The third axis is reversed unless b follows a in the cyclic order of the axes.
+    sign = 1.0 if (b - a) % 3 == 1 else -1.0
     moments = Vec3(I[a], I[b], I[c])
     turned, after = _asymmetric_top(moments, Vec3(spin[a], spin[b], sign * spin[c]), dt)
     relative = Quat(_component(turned, a, b, 0, sign), _component(turned, a, b, 1, sign), _component(turned, a, b, 2, sign), turned.w)

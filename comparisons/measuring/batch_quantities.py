@@ -59,7 +59,8 @@ def compute_cases(cases: Sequence[Comparison]) -> None:
     scene, starts = cases[0].scene, Setup.of_starts([case.scene for case in cases])
     setup, has_residuals = Setup.of(scene), obeys_contact_laws(scene, None)
     for case, origin, clearance in zip(cases, starts.origin, starts.clearance, strict=True):
-        started, last_row = replace(setup, origin=origin, clearance=np.asarray(clearance)), np.asarray(len(case.motion) - 1)
+        started = replace(setup, origin=origin, clearance=np.asarray(clearance))
+        last_row = np.asarray(len(case.motion) - 1)
         vars(case).update(
             motions=Motions(started, States(case.scene, case.motion), np.asarray(case.dt), last_row), clearance=float(clearance)
         )
@@ -87,7 +88,8 @@ def compute_states(all_states: Sequence[States]) -> Iterator[tuple[slice, Array,
         setup = Setup.of_starts([item.scene for item in batch])
         states = np.stack([item.motion.states for item in batch]) if len(batch) > 1 else batch[0].motion.states[np.newaxis]
         lag = np.array([item.motion.velocity_lag for item in batch])
-        dt, last_row = np.full(len(batch), batch[0].motion.t[1] - batch[0].motion.t[0]), np.full(len(batch), rows - 1)
+        dt = np.full(len(batch), batch[0].motion.t[1] - batch[0].motion.t[0])
+        last_row = np.full(len(batch), rows - 1)
         together, valid = motions_side_by_side(setup, states, dt, lag, last_row, np.inf)
         if valid.all():
             for number, item in enumerate(batch):

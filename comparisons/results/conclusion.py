@@ -141,7 +141,8 @@ def _answer(
     counts = kept.groupby("dt")["scene"].nunique()
     common = counts.index[counts == len(of["within"])].tolist()
     held = [dt for dt in common if (kept.loc[kept["dt"] <= dt, "state"] == "within").all()]
-    beyond, others = of["beyond"], [models[scene] for scene in (*of["within"], *of["undecided"])]
+    beyond = of["beyond"]
+    others = [models[scene] for scene in (*of["within"], *of["undecided"])]
     only_beyond = {name: has for name, has in CONDITIONS.items() if not any(map(has, others))}
     having = {name: {scene for scene in beyond if has(models[scene])} for name, has in only_beyond.items()}
     condition = max(having, key=lambda name: len(having[name]), default="") if others else ""

@@ -68,7 +68,8 @@ def run_engine(
         total = 1 + len(others) + drawn
         own = record(engine, scene, dt)
         on_simulations(1, total)
-        found.motion, found.settings, found.claim = own.motion, own.settings, Claim(entry.label, order, precision, own.limitations)
+        found.motion, found.settings = own.motion, own.settings
+        found.claim = Claim(entry.label, order, precision, own.limitations)
         recorded = record_batch(engine, others, dt, lambda done, _: on_simulations(1 + done, total)) if others else [own]
         found.phases = [recording.motion for recording in recorded]
         found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt, QUICK_MEMBERS if quick else None)

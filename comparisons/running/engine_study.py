@@ -103,7 +103,8 @@ class EngineStudy:
         self, entry: EngineEntry, phases: Sequence[StartPhase], progress: Progress, timing: Timing, *, perturbs: bool = True
     ) -> tuple[Outcome, list[Comparison]]:
         """Simulate the scene from all start phases, and measure every metric; from perturbed starts too, if the uncertainty matters."""
-        scene, dt, run, size = self.own.scene, progress.dt, EngineRun(Claim(entry.label)), len(phases)
+        scene, dt, size = self.own.scene, progress.dt, len(phases)
+        run = EngineRun(Claim(entry.label))
         if not timing.ended:
             starts = [phase.scene for phase in phases]
             perturbed = number_of_simulations(self.own, entry.adapter.precision, size) if perturbs else 0
@@ -173,7 +174,8 @@ class EngineStudy:
         options = self.processes.call(self.entry, written_out, scene, dt)
         if isinstance(options, Breakdown):
             return
-        error_of, written = self.error_of(metric, dt), replace(engine, options=options)
+        error_of = self.error_of(metric, dt)
+        written = replace(engine, options=options)
         changed = [name for name in options if name not in written.calibrated.options]
         if not changed or not abs(error_of(written.calibrated)) < 0.5 * sizes[metric.name] * scale(scene, metric.unit):
             return  # it is not the settings that err

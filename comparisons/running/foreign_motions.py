@@ -142,7 +142,8 @@ def _of_states(scene: Scenario, truth: Truth | None, motion: Trajectory) -> Iter
     first = truth.events[0].time if truth is not None and truth.events else np.inf
     known = np.array([0.0]) if truth is None else motion.t[(motion.t < first) & truth.covers(motion.t)][:LONGEST]
     exact = scene.initial_state[None] if truth is None or not len(known) else truth(known).states
-    found, speed = motion.states[: len(exact)], _speed(scene, exact) or 1.0
+    found = motion.states[: len(exact)]
+    speed = _speed(scene, exact) or 1.0
     dt, lag = float(motion.t[1] - motion.t[0]), abs(motion.velocity_lag)
     plain = _difference(scene, found, exact, speed)
     if plain > GROSS:

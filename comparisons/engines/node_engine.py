@@ -60,24 +60,20 @@ class NodeSimulation(Simulation):
         given = {"dt": dt, "gravity": scene.acceleration.tolist(), "floor": floor, "bodies": bodies}
         answer, _ = self._node.ask("open", world=self._world, settings=engine.chosen(scene, dt), **given)
         self._built, self.velocity_lag = answer.get("built"), 0.5 * dt / answer["substeps"]
-        self._state = self._ask(0)[0]
+        self._state = self.record(0)[0]
         self.settings = {"version": self._node.version, **options, **answer["settings"]}
         if unknown := engine.given.keys() - self.settings.keys():
             raise DropspinError(f"{engine.name} {self._node.version} has no {', '.join(sorted(unknown))}.")
 
-    def _ask(self, steps: int, every: int = 1) -> Array:
-        """States now and after each `every` of some steps."""
+    def advance(self, steps: int) -> None:
+        self.record(steps, max(steps, 1))
+
+    def record(self, steps: int, every: int = 1) -> Array:
         answer, states = self._node.ask("record", world=self._world, steps=steps, every=every)
         if "broken" in answer:
             raise Diverged(answer["broken"])
         self._state = states[-1]
         return states
-
-    def advance(self, steps: int) -> None:
-        self._ask(steps, max(steps, 1))
-
-    def record(self, steps: int, every: int = 1) -> Array:
-        return self._ask(steps, every)
 
     def state(self) -> Array:
         return self._state

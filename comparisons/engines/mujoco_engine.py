@@ -110,7 +110,9 @@ def flight_of(integrator: str, version: Version) -> str:
 class MuJoCo(Engine):
     """MuJoCo with exact restitution, or with its defaults."""
 
-    name, mixes_scenes, shapes, takes_offsets, takes_walls = "mujoco", True, SHAPES, True, True
+    name = "mujoco"
+    mixes_scenes = True
+    shapes, takes_offsets, takes_walls = SHAPES, True, True
     choices: ClassVar = {
         "integrator": tuple(INTEGRATORS),
         "profile": PROFILES,
@@ -222,7 +224,8 @@ class MuJoCo(Engine):
         }
 
     def prepare(self, scene: Scenario, dt: float) -> MuJoCoSimulation:
-        integrator, form = self.option("integrator"), {name: self.option(name) for name in FORM}
+        integrator = self.option("integrator")
+        form = {name: self.option(name) for name in FORM}
         settings = {"profile": self.option("profile"), "integrator": integrator} | form
         if self.is_default:
             specification = default_specification(scene, dt, integrator, form)

@@ -30,7 +30,8 @@ def limitations_met(scene: Scenario, states: Array, dt: float, *, estimated: boo
         estimated: Whether the regularisation of a contact has MuJoCo's estimate of its inverse inertia, which is exact for balls alone, and
             never larger than the exact one.
     """
-    times, box = dt * np.arange(len(states), dtype=float), int(estimated and not scene.body.is_ball)
+    times = dt * np.arange(len(states), dtype=float)
+    box = int(estimated and not scene.body.is_ball)
     for surface in scene.surfaces:
         if surface is not scene.floor and not isinstance(surface.friction, float):
             continue  # the restitution of walls has no metric
@@ -107,7 +108,8 @@ def _of_friction_cone(scene: Scenario, surface: Surface, motion: Trajectory, sli
         approach: The largest speed of approach u [m/s].
         left: Time from the first contact to the end [s].
     """
-    e, g, body, is_wall = surface.restitution, -float(scene.acceleration[1]), scene.body, isinstance(surface, Wall)
+    e, g = surface.restitution, -float(scene.acceleration[1])
+    body, is_wall = scene.body, isinstance(surface, Wall)
     fastest = approach + float(np.linalg.norm(scene.acceleration)) * (motion.t[1] - motion.t[0])  # the exact impact may be a step later
     added = surface.coefficient * slip
     late = 2.0 * surface.coefficient * added

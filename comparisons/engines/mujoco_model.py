@@ -171,7 +171,8 @@ def _free_bodies(scene: Scenario, dt: float, integrator: str, form: Mapping[str,
         body.explicitinertial = True
         body.mass = one.body.mass
         body.ipos = [0.0, 0.0, 0.0]
-        body.inertia, body.iquat = moments, np.roll(axes, 1)
+        body.inertia = moments
+        body.iquat = np.roll(axes, 1)
         bodies.append(body)
     return spec, bodies
 

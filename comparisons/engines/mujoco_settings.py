@@ -1,114 +1,25 @@
 """The settings of MuJoCo that can be given, by their names in MJCF: defaults, calibrated values, and where a compiled model has them."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from dropspin.comparisons.engines.options import Setting, spelled
+from dropspin.comparisons.engines.options import settings_in, spelled
 
-ANY = -float("inf")
-IMPEDANCE = 0.9999  # the largest that MuJoCo allows
-OVERRIDDEN, OF_EACH = ("override", "enable"), ("override", "disable")
-SEARCHES = ("solver", "CG", "Newton")
-CONTACT = {
-    "condim": Setting("3", "dimensions of a contact", why="1 without friction, 3 with", values=("1", "3", "4", "6"), is_computed=True),
-    "friction": Setting(
-        (1.0, 1.0, 0.005, 0.0001, 0.0001),
-        "sliding twice, torsional, rolling twice",
-        why="the scene's coefficient; 1e6 where the floor grips",
-        is_computed=True,
-    ),
-    "solref": Setting(
-        (0.02, 1.0),
-        "time constant [s] and damping ratio of a contact; or, if negative, -stiffness and -damping",
-        why="[0, -(1 + e)/dt]: a damper that turns v into -e v in one step; with the default spring the restitution is 0.13 for any e",
-        least=ANY,
-        is_computed=True,
-        needs=(("kappa", "0"), ("spring_steps", "0"), OF_EACH),
-    ),
-    "solimp": Setting(
-        (0.9, 0.95, 0.001, 0.5, 2.0),
-        "impedance of a contact: smallest, largest, width [m], midpoint, power",
-        (IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0),
-        "the hardest contact that MuJoCo allows, at any depth; at the default 0.9 to 0.95, restitution 0.5 becomes 0.466 at 0.25 ms, and "
-        "boxes rest 2 mm deep",
-        needs=(OF_EACH,),
-    ),
-    "solreffriction": Setting(
-        (0.0, 0.0),
-        "solref of friction; zeros for that of the contact",
-        why="stops sliding in one step; if it follows solref, a gripping corner's slip is reversed, which costs 0.51 of its angular "
-        "momentum",
-        least=ANY,
-        is_computed=True,
-        needs=(("profile", "calibrated"),),
-    ),
-    "margin": Setting(0.0, "distance at which a contact begins", unit="m", least=ANY, needs=(OF_EACH,)),
-    "gap": Setting(0.0, "distance beyond the margin at which a contact is listed", unit="m", least=ANY),
-}
-"""Of the pairs of the body with floor and walls; in the default profile of their geoms."""
-WORDS = {"cone": ("pyramidal", "elliptic"), "jacobian": ("dense", "sparse", "auto"), "solver": ("PGS", "CG", "Newton")}
+CONTACT, OPTION, FLAGS, BODY = settings_in(Path(__file__).with_suffix(".toml")).values()
+"""Of the pairs of the body with floor and walls, in the default profile of their geoms; of the tables option and flag; of the free joint.
+
+Options and flags that the installed version has are in `SETTINGS`.
+"""
+assert isinstance(CONTACT["solimp"].calibrated, tuple)
+IMPEDANCE = CONTACT["solimp"].calibrated[0]
+"""The largest that MuJoCo allows."""
+WORDS = {name: setting.values for name, setting in OPTION.items() if setting.values}
 """The words for the numbers 0, 1, …"""
-OPTION = {
-    "cone": Setting(
-        "pyramidal",
-        "friction cone",
-        "elliptic",
-        "elliptic: the same friction in every direction; with pyramidal cones a friction of 1e6 leaves no contact",
-        values=WORDS["cone"],
-    ),
-    "jacobian": Setting(
-        "auto",
-        "matrices of the solver",
-        "dense",
-        "MuJoCo's own choice for few bodies, set explicitly because version 4.0.0 has a fault in its sparse solver",
-        values=WORDS["jacobian"],
-    ),
-    "solver": Setting("Newton", "algorithm of the solver", values=WORDS["solver"]),
-    "iterations": Setting(100, "of the solver, at most"),
-    "tolerance": Setting(1e-8, "at which the solver ends"),
-    "ls_iterations": Setting(50, "of the solver's line search, at most", needs=(SEARCHES,)),
-    "ls_tolerance": Setting(0.01, "at which the line search ends", needs=(SEARCHES,)),
-    "noslip_iterations": Setting(0, "of the solver that takes slip away afterwards"),
-    "noslip_tolerance": Setting(1e-6, "at which it ends"),
-    "impratio": Setting(1.0, "ratio of the impedances of friction and normal force"),
-    "density": Setting(0.0, "density of the medium", unit="kg/m³"),
-    "viscosity": Setting(0.0, "viscosity of the medium", unit="Pa s"),
-    "wind": Setting((0.0, 0.0, 0.0), "velocity of the medium", unit="m/s", least=ANY),
-    "o_margin": Setting(0.0, "margin of all contacts", unit="m", least=ANY, needs=(OVERRIDDEN,)),
-    "o_solref": Setting((0.02, 1.0), "solref of all contacts", least=ANY, needs=(OVERRIDDEN,)),
-    "o_solimp": Setting((0.9, 0.95, 0.001, 0.5, 2.0), "solimp of all contacts", needs=(OVERRIDDEN,)),
-}
-"""Of the table option."""
 SWITCHES = ("disable", "enable")
-FLAGS = {
-    "diagexact": Setting(
-        "disable",
-        "the exact inertia of a contact",
-        "enable",
-        "the contact's exact inertia, not an estimate; at an impedance of 0.9999 the difference is 1e-4 of a corner's energy",
-        values=SWITCHES,
-    ),
-    "island": Setting(
-        "enable",
-        "islands of bodies in contact are solved by themselves",
-        "disable",
-        "one body is one island; the search for it takes a seventh of a step",
-        values=SWITCHES,
-    ),
-    "warmstart": Setting("enable", "the solver starts from the last step's solution", values=SWITCHES),
-    "refsafe": Setting("enable", "the time constant in solref is at least two steps", values=SWITCHES),
-    "eulerdamp": Setting("enable", "damping of joints is implicit in Euler's method", values=SWITCHES),
-    "nativeccd": Setting("enable", "MuJoCo's own collision detection of convex shapes", values=SWITCHES),
-    "multiccd": Setting("enable", "several contact points of convex shapes", values=SWITCHES),
-    "override": Setting("disable", "o_margin, o_solref and o_solimp are those of all contacts", values=SWITCHES),
-    "speculative": Setting("disable", "contacts begin at the time of impact", values=SWITCHES),
-    "sleep": Setting("disable", "bodies at rest fall asleep", values=SWITCHES),
-}
-"""Of the table flag; those that the installed version has are in `SETTINGS`."""
-BODY = {"armature": Setting(0.0, "added to the mass and the moments of inertia of the free joint", unit="kg, kg m²")}
 FLAG_BITS = {
     name[7:].lower(): (flags, int(bit))
     for flags, kind in (("disableflags", mujoco.mjtDisableBit), ("enableflags", mujoco.mjtEnableBit))
@@ -171,4 +82,6 @@ def _field(model: Any, name: str) -> Any:
     """Where a model has a setting of its contacts or of its body: one row for each of them."""
     if name in BODY:
         return getattr(model, f"dof_{name}")
-    return getattr(model, f"geom_{name}") if not model.npair else model.pair_dim if name == "condim" else getattr(model, f"pair_{name}")
+    if not model.npair:
+        return getattr(model, f"geom_{name}")
+    return model.pair_dim if name == "condim" else getattr(model, f"pair_{name}")

@@ -37,7 +37,9 @@ class MuJoCoSimulation(Simulation):
 
     def __init__(self, scene: Scenario, specification: Any, settings: Mapping[str, Any], given: Mapping[str, Any]) -> None:
         """Compile a specification, and set the settings that were given in the model."""
-        self._scene, self.model, self.axes = scene, specification.compile(), damped_axes(scene)
+        self._scene = scene
+        self.model = specification.compile()
+        self.axes = damped_axes(scene)
         self.velocity_lag = 0.0 if settings["integrator"] == "rk4" else 0.5 * self.model.opt.timestep
         set_damping(self.model, scene)
         set_in(self.model, given)
@@ -100,7 +102,8 @@ class MuJoCoBatch(BatchSimulation):
 
     def __init__(self, first: MuJoCoSimulation, models: Sequence[Any], members: Sequence[Scenario]) -> None:
         """Worlds of models, which have the sizes of the first."""
-        self.velocity_lag, self._first, self._models = first.velocity_lag, first, models
+        self.velocity_lag = first.velocity_lag
+        self._first, self._models = first, models
         model, data = first.model, first._data
         self._columns = _columns(model)
         self._datas = [data, *(mujoco.MjData(model) for _ in range(usable_cores() - 1))]
@@ -148,7 +151,9 @@ class MuJoCoBatch(BatchSimulation):
 
 def _starts(model: Any, scenes: Sequence[Scenario]) -> Array:
     """The positions of the free body and of the body far away if there is one, followed by their velocities, of each scene at the start."""
-    bodies = [scenes, [heavy_neighbour(scene) for scene in scenes]] if model.nq > 7 else [scenes]
+    bodies = [scenes]
+    if model.nq > 7:
+        bodies.append([heavy_neighbour(scene) for scene in scenes])
     starts = [from_world(initial_states(one), damped_axes(scenes[0])) for one in bodies]
     return np.concatenate([start[:, :7] for start in starts] + [start[:, 7:] for start in starts], axis=1)
 
@@ -204,8 +209,10 @@ def from_world(states: Array, axes: Array | None = None) -> Array:
 def to_world(rows: Array, axes: Array | None = None) -> Array:
     """States from MuJoCo's coordinates, as `from_world` returns them, shape (..., 13)."""
     states = np.empty_like(rows)
-    states[..., POSITION], states[..., VELOCITY] = rows[..., 0:3], rows[..., 7:10]
-    states[..., 6], states[..., 3:6] = rows[..., 3], rows[..., 4:7]
+    states[..., POSITION] = rows[..., 0:3]
+    states[..., 3:6] = rows[..., 4:7]
+    states[..., 6] = rows[..., 3]
+    states[..., VELOCITY] = rows[..., 7:10]
     states[..., SPIN] = rotate(states[..., ORIENTATION], rows[..., 10:13])
     if axes is not None:
         states[..., ORIENTATION] = multiply(states[..., ORIENTATION], conjugate(axes))

@@ -1,8 +1,10 @@
 """An engine's name, its options with their values, and the label that they make, such as `mujoco[integrator=rk4]`."""
 
 import math
+import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
 from dropspin.comparisons.measuring.symmetries import REPRESENTED
@@ -99,6 +101,20 @@ class Setting(NamedTuple):
         if len(numbers) != 1 or (isinstance(self.default, int) and not numbers[0].is_integer()):
             return None
         return int(numbers[0]) if isinstance(self.default, int) else numbers[0]
+
+
+def settings_in(file: Path) -> dict[str, dict[str, Setting]]:
+    """The settings in a TOML file, by the table that has them; the keys of a setting are the attributes of `Setting`."""
+    tables = tomllib.loads(file.read_text(encoding="utf-8")).items()
+    return {
+        kind: {name: Setting(**{key: _as_tuple(value) for key, value in one.items()}) for name, one in table.items()}
+        for kind, table in tables
+    }
+
+
+def _as_tuple(value: Any) -> Any:
+    """A value of TOML, with tuples for lists."""
+    return tuple(map(_as_tuple, value)) if isinstance(value, list) else value
 
 
 def calibrated_values(settings: Mapping[str, Setting]) -> dict[str, Value]:

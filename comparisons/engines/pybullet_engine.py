@@ -50,7 +50,10 @@ COEFFICIENTS = ("restitution", "lateralFriction")
 class PyBullet(Engine):
     """Bullet's rigid body on a plane, or on a large box."""
 
-    name, order, reasons, shapes, takes_offsets, takes_walls = "pybullet", 1.0, REASONS, SHAPES, True, True
+    name = "pybullet"
+    order = 1.0
+    reasons = REASONS
+    shapes, takes_offsets, takes_walls = SHAPES, True, True
     choices: ClassVar = {
         "coordinates": ("maximal", "multibody"),
         "profile": PROFILES,
@@ -100,7 +103,8 @@ class PyBullet(Engine):
 
     def declines(self, scene: Scenario) -> str | None:
         """Why calibration cannot reproduce the scene."""
-        floor, damping, is_hull = scene.floor, scene.damping, self.option("body") == "hull"
+        floor, damping = scene.floor, scene.damping
+        is_hull = self.option("body") == "hull"
         if not self.is_multibody and may_tumble(scene) and np.prod(np.diag(scene.body.inertia_tensor)) < SMALLEST_INERTIA:
             return f"Bullet omits the gyroscopic term if the product of the moments is below {SMALLEST_INERTIA:g}; scale the scene's units"
         if damping is not None and not self.is_default and max(damping.linear, damping.angular) > FASTEST_DECAY:
@@ -185,7 +189,8 @@ class PyBullet(Engine):
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         coordinates = "multibody" if self.is_multibody else "maximal"
-        form = {"profile": self.option("profile"), "coordinates": coordinates} | {name: self.option(name) for name in self.representations}
+        form = {"profile": self.option("profile"), "coordinates": coordinates}
+        form |= {name: self.option(name) for name in self.representations}
         form |= {"floor": self._floor_in(scene)} if scene.floor else {}
         return PyBulletSimulation(scene, dt, form, self._parameters(scene, dt), self._dynamics(scene), self._surfaces(scene))
 

@@ -58,7 +58,8 @@ def _of_facets(scene: Scenario, rows: Array, dt: float) -> KnownLimitation:
     wrongly by up to M (1 + e) u d / I, and the velocity by up to its lever times that, or (1 + e) u.
     """
     assert scene.floor is not None
-    body, left = scene.body, dt * len(rows)
+    body = scene.body
+    left = dt * len(rows)
     change = (1.0 + scene.floor.restitution) * max(0.0, -float(rows[:, 8].min()))
     turned = body.mass * change * body.size * np.pi / MERIDIANS / float(np.linalg.eigvalsh(body.inertia_tensor)[0])
     return KnownLimitation(
@@ -96,11 +97,12 @@ def _turning_slip(scene: Scenario, rows: Array, dt: float, ratio: float, wrong: 
         ratio: The largest impulse along the floor, over µ times the normal one.
         wrong: a, the error of the velocity at the floor [m/s].
     """
-    body, motion, left = scene.body, Trajectory.from_states(dt * np.arange(len(rows), dtype=float), rows), dt * len(rows)
+    body, left = scene.body, dt * len(rows)
+    motion = Trajectory.from_states(dt * np.arange(len(rows), dtype=float), rows)
     fastest = float(np.max(np.linalg.norm(motion.velocity, axis=1) + body.size * np.linalg.norm(motion.angular_velocity, axis=1)))
     height = scene.clearance if scene.starts_above_floor else body.size
-    g, kinetic = abs(float(scene.acceleration[1])), float(kinetic_energy(scene, motion)[0])
-    energy = max(body.mass * g * height, kinetic)
+    g = abs(float(scene.acceleration[1]))
+    energy = max(body.mass * g * height, float(kinetic_energy(scene, motion)[0]))
     spin = float(np.linalg.norm(angular_momentum(scene, motion), axis=1).max())
     sizes = {
         "position_error": wrong * left,

@@ -64,8 +64,10 @@ class PyBulletSimulation(Simulation):
             dynamics: Properties of the body.
             surfaces: Properties of the floor and the walls.
         """
-        self._scene, self._dt, self.velocity_lag = scene, dt, 0.5 * dt / max(1, parameters.get("numSubSteps", 0))
-        self._is_maximal, self._idle = form["coordinates"] == "maximal", _idle.setdefault(frozenset(parameters), [])
+        self._scene, self._dt = scene, dt
+        self.velocity_lag = 0.5 * dt / max(1, parameters.get("numSubSteps", 0))
+        self._is_maximal = form["coordinates"] == "maximal"
+        self._idle = _idle.setdefault(frozenset(parameters), [])
         self._bullet, self._uses = self._idle.pop() if self._idle else (Connection(), 0)
         tensor = scene.body.inertia_tensor
         self._to_body = None if is_diagonal(tensor) else conjugate(principal_frame(tensor)[1])
@@ -121,21 +123,21 @@ class PyBulletSimulation(Simulation):
         if isinstance(body, Ellipsoid):
             return bullet.createCollisionShape(bullet.GEOM_MESH, vertices=unrotate(axes, body.outline.vertices).tolist())
         # Bullet gives a convex hull one contact point per step: a prism that rolls leaves its course by 0.07 m in 1.7 m, at 1 ms.
-        balls, radii = [bullet.GEOM_SPHERE] * len(corners), [BALL * body.size] * len(corners)
+        balls = [bullet.GEOM_SPHERE] * len(corners)
+        radii = [BALL * body.size] * len(corners)
         return bullet.createCollisionShapeArray(balls, radii=radii, collisionFramePositions=corners)
 
     def _add_plane(self, surface: Surface, kind: str) -> int:
         """Add the floor, or a wall, and return its number."""
-        bullet, half = self._bullet, [FLOOR_HALF_SIZE] * 3
+        bullet = self._bullet
         normal, point = (surface.normal, surface.point) if isinstance(surface, Wall) else (UP, np.zeros(3))
         if isinstance(surface, Floor) and kind == "mesh":
-            flags, indices = bullet.GEOM_FORCE_CONCAVE_TRIMESH, list(chain(*TRIANGLES))
-            return self._add(0.0, bullet.createCollisionShape(bullet.GEOM_MESH, flags=flags, vertices=SQUARE, indices=indices), [0, 0, 0])
+            mesh = {"flags": bullet.GEOM_FORCE_CONCAVE_TRIMESH, "vertices": SQUARE, "indices": list(chain(*TRIANGLES))}
+            return self._add(0.0, bullet.createCollisionShape(bullet.GEOM_MESH, **mesh), [0, 0, 0])
         if kind != "box" and not (isinstance(surface, Floor) and surface.ends):
             return self._add(0.0, bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=list(normal)), list(point))
         # A box, because on a plane Bullet gives a box one contact point per step.
-        if isinstance(surface, Floor):
-            half = box_of(surface)
+        half = box_of(surface) if isinstance(surface, Floor) else [FLOOR_HALF_SIZE] * 3
         turn = {"baseOrientation": conjugate(surface.frame).tolist()} if isinstance(surface, Wall) else {}
         position = (np.array(point) - half[1] * np.array(normal)).tolist()
         return self._add(0.0, bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half), position, **turn)
@@ -201,7 +203,9 @@ class Connection:
         There are no look-ups in the loop, because reading costs as much as a step.
         """
         bullet, client, numbers = self.module, self.client, list[float]()
-        step, pose, rates = bullet.stepSimulation, bullet.getBasePositionAndOrientation, bullet.getBaseVelocity
+        step = bullet.stepSimulation
+        pose = bullet.getBasePositionAndOrientation
+        rates = bullet.getBaseVelocity
         for _ in range(count):
             for _ in range(steps):
                 step(client)

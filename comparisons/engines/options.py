@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
 from dropspin.comparisons.measuring.symmetries import REPRESENTED
-from dropspin.scenarios.errors import DropspinError, UnknownName
+from dropspin.scenarios.errors import DropspinError, verify_known
 from dropspin.scenarios.validation import shown
 
 FEWEST_VALUES = 3
@@ -165,10 +165,9 @@ class Configured:
                 other, *needed = unmet
                 actual, wanted = f"{other}={self.option(other)}", " or ".join(f"{other}={value}" for value in needed)
                 raise DropspinError(f"engine {self.label!r}: {setting} has no effect with {actual}; it needs {wanted}.")
-        for option in self.representations:
-            self._verify_known("representation", option, self.choices)
+        verify_known(f"{self.name}'s representation", self.representations, self.choices)
         for option, values in self.accuracy.items():
-            self._verify_known("accuracy option", option, self._known)
+            verify_known(f"{self.name}'s accuracy option", [option], self._known)
             if len(set(values)) < FEWEST_VALUES:
                 raise DropspinError(
                     f"{self.name}.accuracy[{option!r}]: got {shown(values)}; give at least {FEWEST_VALUES} values, coarsest first."
@@ -181,7 +180,7 @@ class Configured:
                 raise DropspinError(f"{self.name}'s {option} is {why}.")
         if option == "profile" and option not in self.choices:
             raise DropspinError(f"{self.name} has no profiles; dropspin show SCENE -e {self.name} prints the settings that it always has.")
-        self._verify_known("option", option, self._known)
+        verify_known(f"{self.name}'s option", [option], self._known)
         if option in self.settings:
             setting = self.settings[option]
             parsed = setting.parsed(value)
@@ -191,7 +190,7 @@ class Configured:
                 )
             return spelled(parsed)
         if option not in self.numbers:
-            self._verify_known(option, value, self.choices[option])
+            verify_known(f"{self.name}'s {option}", [value], self.choices[option])
             return value
         allowed = self.numbers[option]
         try:
@@ -201,10 +200,6 @@ class Configured:
         if not allowed.least <= number <= allowed.most:
             raise DropspinError(f"{self.name}'s {option}: got {value!r}; it is a number from {allowed.least:g} to {allowed.most:g}.")
         return spelled(number)
-
-    def _verify_known(self, kind: str, given: str, known: Collection[str]) -> None:
-        if given not in known:
-            raise UnknownName(f"{self.name}'s {kind}", given, known)
 
     @property
     def _known(self) -> list[str]:

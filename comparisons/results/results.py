@@ -17,7 +17,8 @@ from dropspin.comparisons.measuring.tolerances import NEGLIGIBLE, scale
 from dropspin.comparisons.results.ensembles import EnsembleOutcome
 from dropspin.comparisons.results.provenance import digest
 from dropspin.comparisons.results.table import are_among, empty_table
-from dropspin.scenarios import Scenario, Trajectory, UnknownName, reference_for
+from dropspin.scenarios import Scenario, Trajectory, reference_for
+from dropspin.scenarios.errors import verify_known
 
 TrajectoryKey = tuple[str, str, float]
 FRAMES = ("table", "predictions", "agreements")
@@ -179,8 +180,7 @@ class Results:
         Raises:
             UnknownName: The run has no such scene.
         """
-        if scene not in self.scenes:
-            raise UnknownName("scene", scene, self.scenes)
+        verify_known("scene", [scene], self.scenes)
         if reference_for(self.scenes[scene]) is None:
             return self.measurements.iloc[:0].set_index("engine")
         found = self.measurements

@@ -154,7 +154,8 @@ def what_changed(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> str:
     rest = [name for name in ("versions", "python", "cpu", "code") if earlier[name] != stamp[name]]
     then, now = _reported_versions(earlier), _reported_versions(stamp)
     codes += [f"the version of {label}" for label in then if label in now and then[label] != now[label]]
-    return " and ".join([*(words.get(name, name) for name in asked), *([] if asked else codes), *(words.get(name, name) for name in rest)])
+    changed = [*asked, *([] if asked else codes), *rest]
+    return " and ".join(words.get(name, name) for name in changed)
 
 
 def _reported_versions(stamp: Mapping[str, Any]) -> dict[str, set[str]]:

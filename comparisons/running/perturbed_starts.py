@@ -7,6 +7,7 @@ import numpy as np
 
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import metrics_for
+from dropspin.comparisons.measuring.requirements import starts_in_flight
 from dropspin.comparisons.running.arguments import MOST_ROWS, EngineEntry
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_run import motions_from
@@ -28,41 +29,35 @@ more if they change at random.
 """
 
 
-def perturbed(scene: Scenario, starts: Sequence[Scenario], precision: type) -> list[list[Scenario]]:
-    """The initial states of a scene perturbed by a few eps, in sets; empty if there are many initial states and none touches the floor.
+def perturbed(scene: Scenario, signs: Array, precision: type) -> Scenario:
+    """A scene with its initial state perturbed by a few eps of a precision.
 
     The height and the orientation of a body that touches the floor are perturbed by eps of double precision, because those of single
-    precision would lift it or sink it. The sign of the perturbation then decides whether all of the initial states touch the floor or
-    none, so each set of perturbations is followed by its opposite.
+    precision would lift it or sink it.
     """
-    if len(starts) == 1:
-        return [[_moved(scene, signs, precision)] for signs in SIGNS]
-    if scene.floor is None or scene.starts_above_floor:
-        return []
-    # It rolls about its corner: perturbed by eps of single precision it would slip, which is another motion.
-    return [[_moved(start, signs, np.float64) for start in starts] for signs in SIGNS[:SETS_OF_STARTS]]
-
-
-def _moved(scene: Scenario, signs: Array, precision: type) -> Scenario:
     start, sizes = scene.initial_state, np.full(13, PERTURBATION * float(np.finfo(precision).eps))
-    if scene.floor is not None and not scene.starts_above_floor:
+    if not starts_in_flight(scene):
         sizes[: 7 if scene.wall else 0] = sizes[[1, 3, 4, 5, 6]] = PERTURBATION * float(np.finfo(float).eps)
     return scene.starting_at(start * (1.0 + sizes * signs))
 
 
-def are_left_out(own: StartPhase, precision: type) -> bool:
-    """Whether a scene is not run from perturbed starts: a quick run has them only in single precision, where verdicts need them."""
-    return own.quick and precision is np.float64
+def _signs(own: StartPhase, precision: type, starts: int) -> Sequence[Array]:
+    """The perturbations of a number of initial states of a scene; none if there are many and none touches the floor.
+
+    The sign of a perturbation decides whether all of many initial states touch the floor or none, so each is followed by its opposite.
+    A quick run has perturbed starts only in single precision, where verdicts need them.
+    """
+    if own.quick and precision is np.float64:
+        return ()
+    if starts == 1:
+        return SIGNS
+    return () if starts_in_flight(own.scene) else SIGNS[:SETS_OF_STARTS]
 
 
 def number_of_simulations(own: StartPhase, precision: type, phases: int) -> int:
     """The number of simulations from perturbed starts of a scene with a number of start phases."""
-    if are_left_out(own, precision):
-        return 0
-    if phases == 1:
-        return len(SIGNS)
     size = len(range(0, phases, _stride(phases)))
-    return SETS_OF_STARTS * size if own.scene.floor is not None and not own.scene.starts_above_floor else 0
+    return size * len(_signs(own, precision, size))
 
 
 def _stride(phases: int) -> int:
@@ -96,17 +91,17 @@ def changes_of_metrics(
     Raises:
         Breakdown: There are no motions from these starts.
     """
-    if are_left_out(own, precision):
-        return []
     stride, metrics = _stride(len(phases)), metrics_for(own.scene, own.truth)
     phases, cases = phases[::stride], cases[::stride]
-    size, sets = len(phases), perturbed(own.scene, [phase.scene for phase in phases], precision)
-    before = {metric.name: metric.value_or_nan(cases) for metric in metrics} if sets else {}
+    size, signs = len(phases), _signs(own, precision, len(phases))
+    before = {metric.name: metric.value_or_nan(cases) for metric in metrics} if signs else {}
     at_once = max(1, MOST_ROWS // (size * own.scene.steps(dt)))
+    if size > 1:  # they roll about their corners: perturbed by eps of single precision they would slip, which is another motion
+        precision = np.float64
 
     def changes(first: int) -> Iterator[Mapping[str, float]]:
-        """From some of the sets; their motions are dropped when it ends."""
-        starts = list(chain(*sets[first : first + at_once]))
+        """From some of the perturbations; their motions are dropped when it ends."""
+        starts = [perturbed(phase.scene, one, precision) for one in signs[first : first + at_once] for phase in phases]
         motions = processes.call(entry, motions_from, starts, dt, on_simulations=lambda done, _: on_simulations(first * size + done))
         if isinstance(motions, Breakdown):
             raise motions
@@ -114,4 +109,4 @@ def changes_of_metrics(
             moved = compare(motions[number : number + size], phases)
             yield {metric.name: abs(metric.value_or_nan(moved) - before[metric.name]) for metric in metrics}
 
-    return list(chain(*map(changes, range(0, len(sets), at_once))))
+    return list(chain(*map(changes, range(0, len(signs), at_once))))

@@ -16,7 +16,7 @@ from dropspin.comparisons.running.arguments import EngineEntry, SceneLike, as_sc
 from dropspin.comparisons.running.driving import Breakdown, classify, finite, record_batch, try_record
 from dropspin.comparisons.running.engine_entries import engine_entries
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
-from dropspin.comparisons.running.perturbed_starts import perturbed
+from dropspin.comparisons.running.perturbed_starts import SIGNS, perturbed
 from dropspin.comparisons.running.process_limits import ONE_MINUTE, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.symmetries.findings import Effects, Finding, Pairs, judged, not_run
@@ -211,7 +211,7 @@ def effects_of_rounding(
 
 def perturbed_starts(entry: EngineEntry, scene: Scenario) -> list[Scenario]:
     """A scene with its initial state perturbed by a few eps, in some ways."""
-    return [start for [start] in perturbed(scene, [scene], entry.adapter.precision)]
+    return [perturbed(scene, signs, entry.adapter.precision) for signs in SIGNS]
 
 
 def states_of(entry: EngineEntry, scene: Scenario, dt: float) -> Array:

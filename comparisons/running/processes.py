@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from multiprocessing import current_process, get_all_start_methods, get_context
-from types import TracebackType
 from typing import Self, TypeVar, TypeVarTuple
 
 from pebble import ProcessExpired, ProcessPool
@@ -181,7 +180,7 @@ class EngineProcesses:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self.abandon()
         for pool in self._pools.values():
             pool.stop()  # type: ignore[no-untyped-call]  # pebble's has no types

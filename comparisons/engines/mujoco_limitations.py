@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Array, KnownLimitation
 from dropspin.comparisons.engines.mujoco_settings import IMPEDANCE
+from dropspin.comparisons.measuring.contact_runs import Mask
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Cylinder
 from dropspin.scenarios.bodies.surface import rise_of_centre
@@ -67,7 +67,7 @@ def _of_upright_cylinder(scene: Scenario, before: Array, after: Array, heights: 
         )
 
 
-def _of_impedance(scene: Scenario, before: Array, arms: Array, touching: NDArray[np.bool_], approach: float) -> KnownLimitation:
+def _of_impedance(scene: Scenario, before: Array, arms: Array, touching: Mask, approach: float) -> KnownLimitation:
     """The change of restitution where several forces share an impulse: those of several corners, or friction and the normal force.
 
     Each has the regularisation R = (1 - d)/d A with its own inverse inertia A, where d is the impedance. It leaves up to R/A of the

@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.judging.error_budget import ErrorBudget, error_budget, is_sufficient, vector_budget, widened
 from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY, Cause
 from dropspin.comparisons.measuring.comparison import Unresolved
+from dropspin.comparisons.measuring.contact_runs import Mask
 from dropspin.comparisons.measuring.metric import Average, Metric
 from dropspin.comparisons.measuring.tolerances import negligible, rounding
 from dropspin.scenarios import Scenario
@@ -284,7 +284,7 @@ def _sideways(point: SeriesPoint, flight: int) -> float:
 
 
 def _budget_of_components(
-    scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint], usable: NDArray[np.bool_], rounded: Array
+    scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint], usable: Mask, rounded: Array
 ) -> ErrorBudget | None:
     """The error budget of the components in the flight in which they are largest; None if there are too few time steps."""
     kept = [

@@ -13,8 +13,8 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dropspin.comparisons.measuring.contact_runs import Mask, RowNumbers
 from dropspin.comparisons.measuring.contacts import ContactResiduals, contact_residuals
 from dropspin.comparisons.measuring.motion_quantities import Motions
 from dropspin.comparisons.measuring.state_quantities import States
@@ -23,8 +23,6 @@ from dropspin.scenarios.mechanics import angular_momentum, apex
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.rotations import cross, length
 from dropspin.scenarios.state import ORIENTATION, Array
-
-Rows = NDArray[np.intp]
 
 SHORTEST_FLIGHT = 16  # steps; a shorter flight is not resolved, and not judged
 SHORT = 0.2
@@ -156,7 +154,7 @@ class Comparison:
         return contact_residuals(self.scene, self.motion.states, self.motions)
 
     @cached_property
-    def flights(self) -> list[Rows]:
+    def flights(self) -> list[RowNumbers]:
         """Rows in the middle half of each flight; the first flight begins at the start, and the last one ends at the end of the motion.
 
         Without a reference, only the motion up to the first contact is a flight.
@@ -185,7 +183,7 @@ class Comparison:
         return inner
 
     @property
-    def flights_with_impact(self) -> list[Rows]:
+    def flights_with_impact(self) -> list[RowNumbers]:
         """The flights, among them the one after the first impact if there is an impact.
 
         Raises:
@@ -226,7 +224,7 @@ class Comparison:
                 return start
         return np.inf
 
-    def _is_desynchronised(self, rows: Rows, flight: NDArray[np.bool_]) -> bool:
+    def _is_desynchronised(self, rows: RowNumbers, flight: Mask) -> bool:
         """Whether the height is wrong by half the height of the flight, so that the body may be in another flight."""
         heights = self.exact.position[flight, 1]
         high = float(np.ptp(heights)) if len(heights) else 0.0

@@ -23,8 +23,8 @@ reverses within an impact, Coulomb's law at each instant (E. J. Routh, 1860) may
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dropspin.comparisons.measuring.contact_runs import Mask, RowNumbers
 from dropspin.comparisons.measuring.motion_quantities import Motions
 from dropspin.scenarios import DropspinError, Scenario, Trajectory
 from dropspin.scenarios.mechanics import angular_momentum
@@ -56,9 +56,9 @@ class ContactResiduals(NamedTuple):
         gap: Height of the body's lowest point above the floor, before or after the step, whichever is lower [m], shape (n,).
     """
 
-    motion: NDArray[np.intp]
-    steps: NDArray[np.intp]
-    in_contact: NDArray[np.bool_]
+    motion: RowNumbers
+    steps: RowNumbers
+    in_contact: Mask
     pull: Array
     cone_excess: Array
     push: Array
@@ -84,7 +84,7 @@ def contact_residuals(scene: Scenario, states: Array, motions: Motions) -> Conta
     return ContactResiduals._make(map(np.concatenate, zip(*parts, strict=True)))
 
 
-def _residuals(scene: Scenario, states: Array, motions: Motions, motion: NDArray[np.intp], steps: NDArray[np.intp]) -> ContactResiduals:
+def _residuals(scene: Scenario, states: Array, motions: Motions, motion: RowNumbers, steps: RowNumbers) -> ContactResiduals:
     """The violations in some steps of some motions."""
     assert scene.floor is not None
     in_contact = np.atleast_2d(motions.in_contact)[motion, steps]

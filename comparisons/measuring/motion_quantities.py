@@ -10,17 +10,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dropspin.comparisons.measuring.contact_runs import RESOLVED, STEADY, ContactRuns, contact_runs
-from dropspin.comparisons.measuring.state_quantities import Mask, States, StatesOfMany
+from dropspin.comparisons.measuring.contact_runs import RESOLVED, STEADY, ContactRuns, Mask, RowNumbers, contact_runs
+from dropspin.comparisons.measuring.state_quantities import States, StatesOfMany
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.ensemble import clearances
 from dropspin.scenarios.mechanics import energy_origin, scalar_product
 from dropspin.scenarios.model import TOUCHING, initial_states
 from dropspin.scenarios.state import Array
-
-RowNumbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

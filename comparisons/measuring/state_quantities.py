@@ -5,15 +5,13 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dropspin.comparisons.measuring.contact_runs import Mask
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.mechanics import Components, angular_momentum, energy, kinetic_energy, lowest_height, scalar_product
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.rotations import length
 from dropspin.scenarios.state import Array
-
-Mask = NDArray[np.bool_]
 
 
 class StatesOfMany(NamedTuple):

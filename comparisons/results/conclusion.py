@@ -95,8 +95,8 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     tried = table[table["dt"].notna() & (table["kind"].isin(["truth", "invariant"]) | is_broken)]
     is_exact = (table["kind"] == "truth") & ~table["scene"].isin(results.recorded)
     errors = table[is_exact & table["metric"].isin(QUESTIONS)]
-    sizes = np.array(relative_sizes(errors, results.scenes))
-    uncertain = np.array(relative_sizes(errors.assign(value=errors["tolerance"].fillna(0.0)), results.scenes))
+    sizes = relative_sizes(errors, results.scenes)
+    uncertain = relative_sizes(errors.assign(value=errors["tolerance"].fillna(0.0)), results.scenes)
     states = np.select([sizes + uncertain <= within, sizes - uncertain > within], ["within", "beyond"], "undecided")
     lost = table[table["metric"].isin(JUMPING) & (table["kind"] == "asymptotic_error") & (table["verdict"] == "failed")]
     is_lost = are_among(errors, lost, ["scene", "engine"]) & (errors["metric"] != "position_error")
@@ -105,7 +105,7 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     remains = results.asymptotic_errors("model", "setting")
     remains = remains[~remains["scene"].isin(results.recorded)]
     least = remains.assign(value=remains[["lower", "upper"]].abs().min(axis=1))
-    remains = remains.assign(size=relative_sizes(remains, results.scenes))[np.array(relative_sizes(least, results.scenes)) > within]
+    remains = remains.assign(size=relative_sizes(remains, results.scenes))[relative_sizes(least, results.scenes) > within]
     keys = ["engine", "scene", "dt"]
     steps = tried[keys].assign(default=np.where(is_broken[tried.index], "beyond", "undecided")).drop_duplicates(keys)
     declined = table[table["verdict"] == "declined"].drop_duplicates(["engine", "scene"])

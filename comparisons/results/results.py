@@ -19,6 +19,7 @@ from dropspin.comparisons.results.provenance import digest
 from dropspin.comparisons.results.table import are_among, empty_table
 from dropspin.scenarios import Scenario, Trajectory, reference_for
 from dropspin.scenarios.errors import verify_known
+from dropspin.scenarios.state import Array
 
 TrajectoryKey = tuple[str, str, float]
 FRAMES = ("table", "predictions", "agreements")
@@ -235,10 +236,10 @@ class Results:
         return 3 if self.breakdowns.any() else int(self.table["verdict"].isin(FAILURES).any())
 
 
-def relative_sizes(rows: pd.DataFrame, scenes: Mapping[str, Scenario]) -> list[float]:
+def relative_sizes(rows: pd.DataFrame, scenes: Mapping[str, Scenario]) -> Array:
     """The absolute values of rows, relative to the scales of their scenes."""
     columns = zip(rows["value"].abs(), rows["scene"], rows["unit"], strict=True)
-    return [value / scale(scenes[scene], unit) for value, scene, unit in columns]
+    return np.array([value / scale(scenes[scene], unit) for value, scene, unit in columns])
 
 
 def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":

@@ -243,7 +243,7 @@ def _largest(results: Results, errors: "pd.DataFrame") -> str:
     """The largest error relative to its scale, with the scenes in which it has this size; empty if there are no errors."""
     if errors.empty:
         return ""
-    sizes = np.array(relative_sizes(errors, results.scenes))
+    sizes = relative_sizes(errors, results.scenes)
     first = errors.to_dict("records")[int(np.argmax(sizes))]
     similar = errors["value"].abs().between(SAME_SIZE * abs(first["value"]), abs(first["value"]) / SAME_SIZE)
     equal = errors[(errors["metric"] == first["metric"]) & (sizes >= SAME_SIZE * sizes.max()) & similar]

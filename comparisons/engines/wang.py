@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dropspin import reference_impl
-from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, KnownLimitation, Simulation
+from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, KnownLimitation, OneWorld, Simulation
 from dropspin.comparisons.engines.mapping import may_tumble
 from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.measuring.comparison import exactly
@@ -82,52 +82,26 @@ class Wang(Engine):
         return WangBatch(members, dt, self.methods())
 
 
-class WangSimulation(Simulation):
-    """A simulation of one scene by the reference implementation."""
-
-    def __init__(self, scene: Scenario, dt: float, methods: reference_impl.Methods) -> None:
-        self.velocity_lag = 0.5 * dt
-        self._body, self._world = reference_body(scene.body), reference_world(scene, dt)
-        self._simulator = reference_impl.Simulator(self._body, self._world, dt, methods)
-        self._scene, self._dt, self._state, self._steps = scene, dt, scene.initial_state, 0
-        self.settings = {"version": version("dropspin"), "numba": version("numba"), **asdict(methods)}
-
-    def advance(self, steps: int) -> None:
-        self.record(steps, max(steps, 1))
-
-    def state(self) -> Array:
-        return self._state.copy()
-
-    def record(self, steps: int, every: int = 1) -> Array:
-        rows = self._simulator.run(self._state, steps, every)
-        self._state = rows[-1].copy()
-        self._steps += steps
-        return rows
-
-    @property
-    def known_limitations(self) -> Sequence[str | KnownLimitation]:  # type: ignore[override]  # computed when they are asked for
-        """Factors of damping in steps of another size, and contacts that were not solved."""
-        unsolved = self._simulator.unsolved_steps
-        own = [f"the contact was not solved in {unsolved} of {self._steps} steps"] if unsolved else []
-        return [*_limitations_met(self._scene, self._dt), *own]
-
-    def as_built(self) -> AsBuilt:
-        gravity = np.zeros(3) if self._world.gravity is None else self._world.gravity
-        return AsBuilt(float(self._body.mass), self._body.inertia, gravity)
-
-
 class WangBatch(BatchSimulation):
-    """Simulations of many scenes by the reference implementation, in threads."""
+    """Simulations of many scenes by the reference implementation, in threads.
+
+    Attributes:
+        body: The bodies.
+        world: Their worlds.
+        simulator: What simulates them.
+        taken: The number of steps that were taken.
+    """
 
     def __init__(self, members: Sequence[Scenario], dt: float, methods: reference_impl.Methods) -> None:
         self.velocity_lag = 0.5 * dt
         if differ_in_start_alone(members):
-            body, world = reference_body(members[0].body), reference_world(members[0], dt)
+            self.body, self.world = reference_body(members[0].body), reference_world(members[0], dt)
         else:
-            body = reference_bodies([member.body for member in members])
-            world = _together([reference_world(member, dt) for member in members])
-        self._simulator = reference_impl.Simulator(body, world, dt, methods)
-        self._states, self._dt = initial_states(members), dt
+            self.body = reference_bodies([member.body for member in members])
+            self.world = _together([reference_world(member, dt) for member in members])
+        self.simulator = reference_impl.Simulator(self.body, self.world, dt, methods)
+        self.taken, self._dt = 0, dt
+        self._states = initial_states(members)
 
     def advance(self, steps: int) -> None:
         self.record(steps, max(steps, 1))
@@ -136,12 +110,37 @@ class WangBatch(BatchSimulation):
         return self._states.copy()
 
     def record(self, steps: int, every: int = 1) -> Array:
-        rows = self._simulator.run(self._states, steps, every)
+        rows = self.simulator.run(self._states, steps, every)
         self._states = rows[:, -1].copy()
+        self.taken += steps
         return rows
 
     def limitations_of(self, scene: Scenario, states: Array) -> Sequence[str | KnownLimitation]:
         return _limitations_met(scene, self._dt)
+
+
+class WangSimulation(OneWorld):
+    """A simulation of one scene by the reference implementation."""
+
+    def __init__(self, scene: Scenario, dt: float, methods: reference_impl.Methods) -> None:
+        self._batch = WangBatch([scene], dt, methods)
+        super().__init__(scene, self._batch)
+        self.settings = {"version": version("dropspin"), "numba": version("numba"), **asdict(methods)}
+
+    def record(self, steps: int, every: int = 1) -> Array:
+        [rows] = self._batch.record(steps, every)
+        return rows
+
+    @property
+    def known_limitations(self) -> Sequence[str | KnownLimitation]:  # type: ignore[override]  # computed when they are asked for
+        """Factors of damping in steps of another size, and contacts that were not solved."""
+        unsolved = self._batch.simulator.unsolved_steps
+        own = [f"the contact was not solved in {unsolved} of {self._batch.taken} steps"] if unsolved else []
+        return [*self._batch.limitations_of(self._scene, self._batch.states()), *own]
+
+    def as_built(self) -> AsBuilt:
+        body, gravity = self._batch.body, self._batch.world.gravity
+        return AsBuilt(float(body.mass), body.inertia, np.zeros(3) if gravity is None else gravity)
 
 
 def reference_body(body: Body) -> reference_impl.Body:

@@ -17,7 +17,7 @@ STEPS_OF_A_TURN = 8
 
 
 def turn_document(simulation, added, axes):
-    simulation._state[SPIN] += added @ axes
+    simulation._batch._states[0, SPIN] += added @ axes
 
 
 def turn_mujoco(simulation, added, axes):

@@ -75,12 +75,11 @@ def run(
     requested, entries, dts, stamp = _request(scenes, engines, dt, resources, quick)
     earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if not what_changed(part.provenance, stamp)}
     parts: dict[str, Results] = {}
-    lock, keep = Lock(), keep or ignore
+    lock, keep, tell = Lock(), keep or ignore, on_progress or ignore
 
     def report(progress: Progress) -> None:
-        if on_progress is not None:
-            with lock:
-                on_progress(progress)
+        with lock:
+            tell(progress)
 
     for scene in (own.scene for own in requested if own.scene.model_dump_json() in earlier):
         parts[scene.name] = replace(earlier[scene.model_dump_json()], scenes={scene.name: scene})
@@ -93,8 +92,7 @@ def run(
     with started_crews(jobs, len(pending), entries, resources) as crews:
         timings = time_engines([own.scene for own in pending], entries, dts, crews[0], report)
         expected = forecast(pending, entries, dts, timings, len(crews))
-        if on_forecast is not None:
-            on_forecast(expected)
+        (on_forecast or ignore)(expected)
 
         def of_scene(own: StartPhase, processes: EngineProcesses) -> Results:
             return run_scene(own, entries, dts, processes, report, stamp, timings)

@@ -29,11 +29,7 @@ class Wang(Engine):
     name = "wang"
     shapes, takes_offsets, takes_walls = SHAPES, True, True
     mixes_scenes = True
-    choices: ClassVar = {
-        "rotation": tuple(ROTATIONS),
-        "law": tuple(LAWS),
-        "contact": tuple(CONTACTS),
-    }
+    choices: ClassVar = {"rotation": tuple(ROTATIONS), "law": tuple(LAWS), "contact": tuple(CONTACTS)}
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -10,6 +10,8 @@ from dropspin.scenarios.field_types import NotNegative, Number, Positive, Table,
 from dropspin.scenarios.rotations import turned_states
 from dropspin.scenarios.state import POSITION, Array
 
+FrictionLaw = Literal["cone", "integrated-newton", "integrated-poisson", "integrated-energy"]
+
 
 class Surface(Table):
     """What the contacts of a floor or a wall depend on.
@@ -20,7 +22,7 @@ class Surface(Table):
     restitution: Annotated[Number, Field(ge=0, le=1)]
     friction: Literal["none", "infinite"] | NotNegative
     rest_speed: NotNegative = 0.0
-    impact_law: Literal["cone", "integrated-newton", "integrated-poisson", "integrated-energy"] = "cone"
+    impact_law: FrictionLaw = "cone"
 
     @property
     def coefficient(self) -> float:

@@ -23,13 +23,11 @@ Valid for: a point that approaches; a positive coefficient of friction. `cone_im
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from dropspin.scenarios.state import Array
-
-Restitution = Literal["newton", "poisson", "energy"]
 
 N = np.array([0.0, 1.0, 0.0])
 ON_CIRCLE = 1e-6  # distance of a root from the unit circle that is due to rounding
@@ -68,11 +66,11 @@ def cone_impulse(K: Array, u: Array, e: float, friction: float) -> Array | None:
     return impulses[0] if len(impulses) == 1 else None
 
 
-def integrated_impulse(K: Array, u: Array, e: float, friction: float, restitution: Restitution) -> Array:
-    """The impulse of the integrated law [N s], shape (3,); the arguments are those of `cone_impulse`."""
+def integrated_impulse(K: Array, u: Array, e: float, friction: float, restitution: str) -> Array:
+    """The impulse of the integrated law [N s], shape (3,); `restitution` names its end, the other arguments are as in `cone_impulse`."""
     compression = _Phase(u, 0.0, 0.0)
     at_rest = _advanced(K, friction, compression, lambda phase: phase.velocity[1])
-    ends: dict[Restitution, Callable[[_Phase], float]] = {
+    ends: dict[str, Callable[[_Phase], float]] = {
         "newton": lambda phase: phase.velocity[1] + e * u[1],
         "poisson": lambda phase: phase.impulse - (1.0 + e) * at_rest.impulse,
         "energy": lambda phase: phase.work - (1.0 - e**2) * at_rest.work,

@@ -24,13 +24,12 @@ import numpy as np
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY, Array
-from dropspin.scenarios.surfaces import Surface
-from dropspin.scenarios.truths.friction_impact import Restitution, cone_impulse, integrated_impulse
+from dropspin.scenarios.surfaces import FrictionLaw, Surface
+from dropspin.scenarios.truths.friction_impact import cone_impulse, integrated_impulse
 
-Law = Literal["note", "normal", "poisson", "clamped", "coulomb", "cone", "integrated-newton", "integrated-poisson", "integrated-energy"]
+Law = Literal["note", "normal", "poisson", "clamped", "coulomb", FrictionLaw]
 LAWS: tuple[Law, ...] = get_args(Law)
-FRICTION_LAWS: tuple[Law, ...] = ("cone", "integrated-newton", "integrated-poisson", "integrated-energy")
-ENDS: dict[str, Restitution] = {"integrated-newton": "newton", "integrated-poisson": "poisson", "integrated-energy": "energy"}
+FRICTION_LAWS: tuple[Law, ...] = get_args(FrictionLaw)
 
 
 def law_of(scene: Scenario, surface: Surface | None = None) -> Law:
@@ -85,8 +84,8 @@ def _impulse(law: Law, response: Array, u: Array, e: float, friction: str | floa
         return _coulomb(response, u, e, float(friction))
     if law == "cone":
         return cone_impulse(response, u, e, float(friction))
-    if law in ENDS:
-        return integrated_impulse(response, u, e, float(friction), ENDS[law])
+    if law in FRICTION_LAWS:
+        return integrated_impulse(response, u, e, float(friction), law.removeprefix("integrated-"))
     stiffness = np.linalg.inv(response)
     if law == "poisson":
         leaving = e * max(-float(stiffness[1] @ u), 0.0) / stiffness[1, 1]

@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.scenarios.bodies.surface import depth_below_centre
+from dropspin.scenarios.bodies.surface import clearances
 from dropspin.scenarios.field_types import unit
 from dropspin.scenarios.model import Ensemble, Scenario
-from dropspin.scenarios.rotations import about, multiply, rotate
+from dropspin.scenarios.rotations import about, multiply
 from dropspin.scenarios.state import ORIENTATION, RATES, Array
 
 DRAWS_PER_BLOCK = 1024  # generated together, however many of them are requested
@@ -88,12 +88,6 @@ def _turn(height: float, around: float, angle: float) -> list[float]:
     sideways, half = math.sqrt(1.0 - up * up), 0.5 * angle
     axis = sideways * math.cos(2.0 * math.pi * around), up, sideways * math.sin(2.0 * math.pi * around)
     return [*(math.sin(half) * component for component in axis), math.cos(half)]
-
-
-def clearances(states: Array, vertices: Array, semi_axes: Array) -> Array:
-    """Heights of the bodies' lowest points [m], shape (B,); arguments as in `spread_starts`."""
-    heights = rotate(states[:, np.newaxis, ORIENTATION], vertices)[..., 1]
-    return states[:, 1] + heights.min(axis=1) - depth_below_centre(states[:, ORIENTATION], semi_axes)
 
 
 def _angles(shares: Array, largest: float) -> Array:

@@ -9,12 +9,11 @@ import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from dropspin.scenarios.bodies import Body
-from dropspin.scenarios.bodies.surface import depth_below_centre
+from dropspin.scenarios.bodies.surface import clearances
 from dropspin.scenarios.damping import Damping
 from dropspin.scenarios.field_types import NotNegative, Number, Positive, Table, Vector, unit
 from dropspin.scenarios.recording import Recording, start_of
-from dropspin.scenarios.rotations import rotate
-from dropspin.scenarios.state import ORIENTATION, PARTS, Array
+from dropspin.scenarios.state import PARTS, Array
 from dropspin.scenarios.surfaces import Floor, Surface, Wall
 from dropspin.scenarios.text import Prose, Text, joined, verify_line
 
@@ -198,9 +197,7 @@ class Scenario(Table):
         return self._lowest(wall.as_floor(self.initial_state))
 
     def _lowest(self, state: Array) -> float:
-        orientation = state[ORIENTATION]
-        heights, depth = rotate(orientation, self.body.vertices)[:, 1], depth_below_centre(orientation, self.body.semi_axes)
-        return float(state[1]) + float(heights.min()) - float(depth)
+        return float(clearances(state[np.newaxis], self.body.vertices, self.body.semi_axes)[0])
 
     @property
     def _starts_beside_the_floor(self) -> bool:

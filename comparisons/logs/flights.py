@@ -13,7 +13,7 @@ from dropspin.comparisons.logs.log import Log, Toss
 from dropspin.comparisons.logs.noise import Noise, Regression, end_of, regression
 from dropspin.comparisons.logs.rotors import Rotation, misread, rotation, turn_by
 from dropspin.comparisons.running.arguments import ignore
-from dropspin.scenarios.ensemble import clearances
+from dropspin.scenarios.bodies.surface import clearances
 from dropspin.scenarios.rotations import multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 

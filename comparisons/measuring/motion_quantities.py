@@ -14,7 +14,7 @@ import numpy as np
 from dropspin.comparisons.measuring.contact_runs import RESOLVED, STEADY, ContactRuns, Mask, RowNumbers, contact_runs
 from dropspin.comparisons.measuring.state_quantities import States, StatesOfMany
 from dropspin.scenarios import Scenario, Trajectory
-from dropspin.scenarios.ensemble import clearances
+from dropspin.scenarios.bodies.surface import clearances
 from dropspin.scenarios.mechanics import energy_origin, scalar_product
 from dropspin.scenarios.model import TOUCHING, initial_states
 from dropspin.scenarios.state import Array

@@ -25,8 +25,9 @@ from dropspin.comparisons.sweeps.jobs import OPTION, Jobs, scene_of
 from dropspin.comparisons.sweeps.outcomes import Outcomes, not_run, requested_metrics, standard_metrics
 from dropspin.scenarios import Scenario, SceneError, Trajectory
 from dropspin.scenarios.bodies import Body
+from dropspin.scenarios.bodies.surface import clearances
 from dropspin.scenarios.damping import MOTIONS
-from dropspin.scenarios.ensemble import clearances, spread_starts
+from dropspin.scenarios.ensemble import spread_starts
 from dropspin.scenarios.field_names import Path, path_of, set_field, with_fields
 from dropspin.scenarios.field_types import unit
 from dropspin.scenarios.model import TOUCHING

@@ -7,7 +7,7 @@ below it. A disc has a semi-axis of 0. A ball has equal semi-axes r, and its low
 import numpy as np
 
 from dropspin.scenarios.rotations import rotate, unrotate
-from dropspin.scenarios.state import UP, Array
+from dropspin.scenarios.state import ORIENTATION, UP, Array
 
 RIM = np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0], [-1.0, 1.0, 0.0], [0.0, 1.0, -1.0]])
 """Four points of a rim, in units of the semi-axes; that along y is 0."""
@@ -17,6 +17,18 @@ def depth_below_centre(orientation: Array, semi_axes: Array) -> Array:
     """Depth of the lowest point of ellipsoids below their centres [m], shape (...), from shapes (..., 4) and (..., 3)."""
     stretched = np.linalg.norm(semi_axes * unrotate(orientation, np.broadcast_to(UP, (*orientation.shape[:-1], 3))), axis=-1)
     return np.where(np.ptp(semi_axes, axis=-1) == 0.0, semi_axes[..., 0], stretched)
+
+
+def clearances(states: Array, vertices: Array, semi_axes: Array) -> Array:
+    """Heights of the bodies' lowest points above the plane y = 0 [m], shape (B,).
+
+    Args:
+        states: States of the bodies, shape (B, 13).
+        vertices: Vertices of one body, shape (n, 3), or of each, shape (B, n, 3) [m].
+        semi_axes: Semi-axes about the vertices of one body, shape (3,), or of each, shape (B, 3) [m].
+    """
+    heights = rotate(states[:, np.newaxis, ORIENTATION], vertices)[..., 1]
+    return states[:, 1] + heights.min(axis=1) - depth_below_centre(states[:, ORIENTATION], semi_axes)
 
 
 def rise_of_centre(orientation: Array, semi_axes: Array) -> Array:

@@ -16,6 +16,9 @@ from dropspin.scenarios import DropspinError
 CHANGED = ["worse", "moved", "better", "gone"]
 """The kinds of change that a history lists."""
 
+DEFINED = [*KEY, "scene_digest"]
+"""The columns that identify a result of several runs."""
+
 
 class Move(NamedTuple):
     """A run in which results of an engine changed.
@@ -41,7 +44,7 @@ class History(NamedTuple):
     Attributes:
         names: Names of the runs.
         stamps: Time, commit and versions of each run.
-        results: The comparable results of all runs; the column `run` is the number of the run.
+        results: The comparable results of all runs; `run` is the number of the run, `scene_digest` a hash of the scene's physics.
         moves: The changes, in the order of the runs.
     """
 
@@ -73,35 +76,41 @@ def history(runs: Mapping[str, Results]) -> History:
         {"run": name, "started": one.provenance["started"], "commit": one.provenance["commit"]} | versions_behind(one.provenance)
         for name, one in ordered
     ]
-    measured = list(map(comparable_results, results))
+    measured = [_defined(comparable_results(one), one) for one in results]
     every = pd.concat([rows.assign(run=number) for number, rows in enumerate(measured)], ignore_index=True)
     return History(names, pd.DataFrame(stamps), every, _moves(results, measured))
+
+
+def _defined(rows: pd.DataFrame, run: Results) -> pd.DataFrame:
+    """Results with the hash of the physics that their scene has in a run."""
+    return rows.assign(scene_digest=rows["scene"].map({name: scene.digest for name, scene in run.scenes.items()}))
+
+
+def _of_same_scenes(rows: pd.DataFrame, run: Results) -> pd.DataFrame:
+    """The results of scenes that have the same physics in a run."""
+    return rows[rows["scene_digest"] == _defined(rows, run)["scene_digest"]]
 
 
 def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> list[Move]:
     """The runs in which results changed.
 
     Each result is compared with its value after its last change, so that slow drifts are found. Runs that did not request the result have
-    no effect; in the first one in which the engine broke down or declined the scene, it is gone.
+    no effect; in the first one in which the engine broke down or declined the scene, it is gone. Results of a scene with another
+    definition are other results.
     """
     held: dict[str, pd.DataFrame] = {}
-    scenes: dict[str, str] = {}
     absent: dict[str, list[tuple[str, ...]]] = {}
     found = []
     for run, one in enumerate(results):
-        digests = {name: scene.digest for name, scene in one.scenes.items()}
-        other = {name for name, digest in digests.items() if scenes.get(name, digest) != digest}
-        scenes |= digests
-        held = {engine: rows[~rows["scene"].isin(other)] for engine, rows in held.items()}
         for engine in one.engines:
             now = results_of[run][results_of[run]["engine"] == engine]
             earlier = held.get(engine, now.iloc[:0])
-            before = asked_for(earlier, one)
-            change = changes(before, now)
-            keys, is_gone = pd.MultiIndex.from_frame(change[KEY]), change["change"] == "gone"
+            before = asked_for(_of_same_scenes(earlier, one), one)
+            change = _defined(changes(before, now), one)
+            keys, is_gone = pd.MultiIndex.from_frame(change[DEFINED]), change["change"] == "gone"
             was_gone = is_gone & keys.isin(absent.get(engine, []))
             absent[engine] = [*set(absent.get(engine, [])).difference(keys), *keys[is_gone]]
-            for number, rows in _since(change.loc[change["change"].isin(CHANGED) & ~was_gone, KEY], results_of[:run], now):
+            for number, rows in _since(change.loc[change["change"].isin(CHANGED) & ~was_gone, DEFINED], results_of[:run], now):
                 cause = attributed(rows, results[number], one, engine, unmoved_engines(results_in_common(results[number], one)))
                 found.append(Move(engine, number, run, rows, cause))
             stays = change["change"].isin(["same", "gone", "undefined"])
@@ -116,7 +125,7 @@ def _since(keys: pd.DataFrame, earlier: Sequence[pd.DataFrame], now: pd.DataFram
     Of a slow drift that is not the run before, which alone may not have caused the change.
     """
     for number, rows in reversed(list(enumerate(earlier))):
-        found = changes(rows.merge(keys, on=KEY), now.merge(keys, on=KEY))
+        found = changes(rows.merge(keys, on=DEFINED), now.merge(keys, on=DEFINED))
         found = found[found["change"].isin(CHANGED)]
         if len(found):
             yield number, most_changed_first(found)

@@ -20,6 +20,8 @@ LONGEST_LABEL = 22
 def result_over_runs(history: History, scene_name: str, metric: str) -> Chart:
     """The absolute value of a metric at the smallest time step in several runs, logarithmic; a cross marks each run in which it changed.
 
+    Lines join runs with the same definition of the scene.
+
     Args:
         history: The runs.
         scene_name: The name of a scene of the runs.
@@ -37,10 +39,11 @@ def result_over_runs(history: History, scene_name: str, metric: str) -> Chart:
     for engine, (colour, marker, dashes) in engine_styles(list(dict.fromkeys(history.results["engine"]))).items():
         mine = results[(results["engine"] == engine) & (results["steps"] == steps)].sort_values("run")
         moved = [move.run for move in history.moves if move.engine == engine and (of(move.results)["steps"] == steps).any()]
-        runs, sizes = mine["run"].to_numpy(float), mine["value"].abs().to_numpy(float)
-        has_moved = np.isin(runs, moved)
-        lines.append(Line(engine, runs, sizes, colour, dashes=dashes, marker=marker))
-        lines.append(Line(CHANGED, runs[has_moved], sizes[has_moved], width=0.0, marker="X"))
+        for _, same in mine.groupby("scene_digest", sort=False):
+            runs, sizes = same["run"].to_numpy(float), same["value"].abs().to_numpy(float)
+            has_moved = np.isin(runs, moved)
+            lines.append(Line(engine, runs, sizes, colour, dashes=dashes, marker=marker))
+            lines.append(Line(CHANGED, runs[has_moved], sizes[has_moved], width=0.0, marker="X"))
     label = f"{metric_label(metric)}\nat {plain(1e3 * float(steps))} ms"
     return Chart("run", label, [line for line in lines if len(line.x)], y_log=True, ticks=list(enumerate(run_labels(history))))
 

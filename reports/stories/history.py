@@ -1,6 +1,8 @@
 """The output of `dropspin compare history`: the runs in which results changed."""
 
-from dropspin.comparisons.regressions.history import History
+from collections.abc import Iterator
+
+from dropspin.comparisons.regressions.history import DEFINED, History
 from dropspin.reports.document import Charts, Document, Heading, Part, Rows, Sentences, Table
 from dropspin.reports.plots.history import result_over_runs
 from dropspin.reports.stories.compare import change_cells
@@ -20,13 +22,23 @@ def document(history: History) -> Document:
     ]
     scenes = counted(history.results["scene"].nunique(), "scene")
     unchanged = f"No result changed in {counted(len(history.names), 'run')} of {scenes}."
+    if not history.results.duplicated(DEFINED).any():
+        unchanged = "No result was compared, because no two runs have one in common."
     changed = rows(history)
-    parts: list[Part] = [Table(changed), Sentences(causes or [unchanged])]
+    parts: list[Part] = [Table(changed), Sentences([*(causes or [unchanged]), *_redefined(history)])]
     drawn = history.results[~history.results["kind"].isin(["order", "asymptotic_error"])]
     for scene in history.results["scene"].unique():
         metrics = drawn.loc[drawn["scene"] == scene, "metric"].unique()
         parts += [Heading(scene), Charts(scene, [result_over_runs(history, scene, metric) for metric in metrics])]
     return Document(f"Results over {len(history.names)} runs", parts)
+
+
+def _redefined(history: History) -> Iterator[str]:
+    """For each scene with several definitions, the runs whose definition is not that of the run before."""
+    for scene, of_scene in history.results.groupby("scene", sort=False):
+        digests = of_scene.groupby("run")["scene_digest"].first()
+        if runs := [history.names[run] for run in digests.index[digests != digests.shift()][1:]]:
+            yield f"{scene} has another definition in {', '.join(runs)} than in the run before: only runs with the same one are compared."
 
 
 def rows(history: History) -> Rows:

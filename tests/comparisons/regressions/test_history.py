@@ -6,6 +6,8 @@ import pytest
 from support.releases import TURNING, Broken, Candidate, Euler, part, released
 
 from dropspin.comparisons.regressions.history import history
+from dropspin.reports.plots.history import result_over_runs
+from dropspin.reports.stories.history import document
 from dropspin.scenarios import DropspinError
 
 
@@ -68,3 +70,20 @@ def test_history_of_one_run_is_refused(before):
 def test_scene_that_changed_while_an_engine_was_absent_moves_nothing(before, longer_fall):
     """Results of the scene before its change are not compared with later ones."""
     assert not history(dated(part(before, "fall-spin"), part(longer_fall, engines=["mujoco"]), longer_fall)).moves
+
+
+def test_scene_that_returns_to_a_definition_is_compared_with_the_last_run_of_it(before, longer_fall):
+    """The result of the last run is 7 tolerances worse than that of the first one; the run between simulated something else."""
+    runs = history(dated(part(before, "fall-spin"), longer_fall, part(drifted(before, 7.0), "fall-spin")))
+    [move] = runs.moves
+    assert (move.before, move.run, *move.results["metric"], *move.results["in_tolerances"].round(6)) == (0, 2, "orientation_error", 7.0)
+    chart = result_over_runs(runs, "fall-spin", "position_error")
+    assert [[*line.x] for line in chart.lines if line.label == "candidate"] == [[0, 2], [1]]
+    attributed, redefined = document(runs).parts[1].items
+    assert attributed.startswith("candidate: 1 result changed from a to c.")
+    assert redefined == "fall-spin has another definition in b, c than in the run before: only runs with the same one are compared."
+
+
+def test_history_without_two_runs_of_one_definition_does_not_say_that_nothing_changed(before, longer_fall):
+    first, _ = document(history(dated(part(before, "fall-spin"), longer_fall))).parts[1].items
+    assert first == "No result was compared, because no two runs have one in common."

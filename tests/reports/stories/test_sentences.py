@@ -12,7 +12,7 @@ from dropspin.comparisons.record.rerun import Again
 from dropspin.comparisons.regressions.attribution import Attribution
 from dropspin.comparisons.regressions.changes import EqualMotions, SpeedChange
 from dropspin.comparisons.regressions.comparing import Changes
-from dropspin.comparisons.regressions.history import History
+from dropspin.comparisons.regressions.history import DEFINED, History
 from dropspin.comparisons.symmetries.findings import Finding
 from dropspin.reports.stories import compare, conform, history, numbers, record, reproduce, rerun, scene, symmetries
 from dropspin.scenarios import load
@@ -59,7 +59,7 @@ def lost(*scenes, difference=0.25):
 
 
 def unchanged(*names):
-    results = pd.DataFrame({"scene": ["s"], "kind": ["order"], "metric": ["m"]})
+    results = pd.DataFrame([dict.fromkeys(DEFINED, "order") | {"run": run} for run in range(2)])
     return history.document(History(list(names), pd.DataFrame(), results, [])).parts[1].items[0]
 
 

@@ -1,7 +1,7 @@
 """The study of the command `dropspin symmetries`: whether engines keep the symmetries of a scene, and repeat their results."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -87,29 +87,34 @@ def _of_engine(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, 
     if isinstance(compared, Breakdown):
         return [not_run(replace(none, symmetry=name), compared) for name in NAMES]
     rows, findings = compared
-    for name in IN_NEW_PROCESSES:
-        processes.renew(entry)
-        again = processes.call(entry, _in_new_process, scene, dt, rows, name)
-        findings.append(not_run(replace(none, symmetry=name), again) if isinstance(again, Breakdown) else again)
+    processes.renew(entry)
+    again = processes.call(entry, _finding, scene, dt, rows, AGAIN)
+    processes.renew(entry)
+    batch = processes.call(entry, _batch, scene, dt)
+    processes.renew(entry)
+    on_one_core = batch if isinstance(batch, Breakdown) else processes.call(entry, _on_one_core, scene, dt, rows, batch)
     processes.renew(entry)  # the last one may use one processor only
-    return findings
+    repeated = {NEW_PROCESS: again, ONE_CORE: on_one_core}
+    return findings + [
+        not_run(replace(none, symmetry=name), one) if isinstance(one, Breakdown) else replace(one, symmetry=name)
+        for name, one in repeated.items()
+    ]
 
 
 def _compare(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array, list[Finding]]:
     """The engine's motion, and all findings that one process can give."""
     rows = states_of(entry, scene, dt)
-    names = [name for name in NAMES if name not in IN_NEW_PROCESSES]
+    names = [name for name in NAMES if name not in (NEW_PROCESS, ONE_CORE)]
     return rows, findings_of(entry, scene, dt, rows, [*names, *entry.adapter.represented_otherwise()])
 
 
-def _in_new_process(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: str) -> Finding:
-    """The finding of a repeated run in a process that did nothing before; for `ONE_CORE`, all its threads may use one processor."""
-    if name == ONE_CORE:
-        if not hasattr(os, "sched_setaffinity") or usable_cores() == 1:
-            raise Breakdown("declined", "the process cannot be restricted to fewer processors")
-        for thread in os.listdir("/proc/self/task"):
-            os.sched_setaffinity(int(thread), {min(os.sched_getaffinity(0))})
-    return replace(_finding(entry, scene, dt, rows, IN_NEW_PROCESSES[name]), symmetry=name)
+def _on_one_core(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, batch: Sequence[Array]) -> Finding:
+    """The finding of a batch that is run again in a new process, of which all threads may use one processor only."""
+    if not hasattr(os, "sched_setaffinity") or usable_cores() == 1:
+        raise Breakdown("declined", "the process cannot be restricted to fewer processors")
+    for thread in os.listdir("/proc/self/task"):
+        os.sched_setaffinity(int(thread), {min(os.sched_getaffinity(0))})
+    return _finding(entry, scene, dt, rows, BATCH, batch)
 
 
 def findings_of(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, names: Iterable[str]) -> list[Finding]:
@@ -130,10 +135,11 @@ def findings_of(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, nam
     return [finding if finding.symmetry in BITWISE else replace(unknown, symmetry=finding.symmetry) for finding in found]
 
 
-def _finding(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: str) -> Finding:
+def _finding(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: str, batch: Sequence[Array] = ()) -> Finding:
+    """The finding on one symmetry; `batch` has the motions of an earlier batch, with which a batch is compared."""
     none = Finding(scene.name, entry.label, name, "not run")
     try:
-        pairs, effects = _pairs(entry, scene, dt, rows, name)
+        pairs, effects = _pairs(entry, scene, dt, rows, name, batch)
         away = max(0.0, _distance(SYMMETRIES[name].transformed(scene)) - _distance(scene)) if name in SYMMETRIES else 0.0
         return judged(none, scene, dt, pairs, effects, entry.adapter.precision, away)
     except DropspinError as error:  # the transformed scene is no valid scene
@@ -147,7 +153,7 @@ def _distance(scene: Scenario) -> float:
     return float(np.linalg.norm(scene.start.position)) / scene.body.size
 
 
-def _pairs(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: str) -> tuple[Pairs, Effects | None]:
+def _pairs(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: str, batch: Sequence[Array]) -> tuple[Pairs, Effects | None]:
     """The motions that should be equal, and the function that measures effects of rounding; None if it has no effect."""
     effects = partial(effects_of_rounding, entry, scene, dt, rows)
     if name == AGAIN:
@@ -158,12 +164,21 @@ def _pairs(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: st
         return _halves(entry, scene, dt, rows)
     if name == BATCH:
         # A compiler vectorises a batch differently from a single simulation, and rounding depends on that.
-        others = [batch_member(entry.adapter, scene, share) for share in FASTER]
-        together = [finite(recording).states for recording in record_batch(entry.adapter, [scene, *others], dt)]
-        alone = [rows, *(states_of(entry, other, dt) for other in others)]
-        return list(zip(alone, together, strict=True)), effects if entry.adapter.compiles else None
+        # A compiler vectorises a batch differently from a single simulation, and rounding depends on that.
+        before = batch or [rows, *(states_of(entry, other, dt) for other in _others(entry, scene))]
+        return list(zip(before, _batch(entry, scene, dt), strict=True)), effects if entry.adapter.compiles else None
     other = replace(entry, engine=entry.adapter.represented_otherwise()[name])
     return [(rows, states_of(other, scene, dt))], effects
+
+
+def _batch(entry: EngineEntry, scene: Scenario, dt: float) -> list[Array]:
+    """The motions of a scene and two others that are run together, states of shape (n, 13)."""
+    return [finite(recording).states for recording in record_batch(entry.adapter, [scene, *_others(entry, scene)], dt)]
+
+
+def _others(entry: EngineEntry, scene: Scenario) -> list[Scenario]:
+    """The other members of a scene's batch."""
+    return [batch_member(entry.adapter, scene, share) for share in FASTER]
 
 
 def batch_member(engine: Engine, scene: Scenario, share: float) -> Scenario:
@@ -221,7 +236,3 @@ def states_of(entry: EngineEntry, scene: Scenario, dt: float) -> Array:
         Breakdown: There is no motion, or it is not finite.
     """
     return finite(try_record(entry.adapter, scene, dt)).states
-
-
-IN_NEW_PROCESSES = {NEW_PROCESS: AGAIN, ONE_CORE: BATCH}
-"""Ways to repeat a run in a process that did nothing before, and those of the same process that do the same."""

@@ -100,7 +100,7 @@ def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Eff
     largest, steps = float(difference.max()), np.arange(len(difference), dtype=float)
     allowed, eps = np.zeros_like(difference), float(np.finfo(precision).eps)
     if effects is not None:
-        allowed = eps * (STEP_MULTIPLE + EPS_PER_STEP * steps)
+        allowed = rounding(steps, precision)
     if effects is not None and not (difference <= allowed).all():  # most engines need no perturbed runs
         grown = _recent_maximum(np.max([np.zeros_like(difference), *effects()], axis=0))
         # A large effect is one of chance, such as a contact that is missed in a time step: it does not add up, and others are as large.
@@ -117,6 +117,11 @@ def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Eff
     status: Status = "nearly kept" if unexplained <= MATTERS else "lost"
     motions = pairs[int(np.argmax([values.max() for values in of_pairs]))] if status == "lost" else None
     return replace(none, status=status, difference=unexplained, step=first, time=first * dt, motions=motions)
+
+
+def rounding(steps: Array, precision: type) -> Array:
+    """The difference that rounding explains after some steps, if the motion does not amplify it."""
+    return float(np.finfo(precision).eps) * (STEP_MULTIPLE + EPS_PER_STEP * steps)
 
 
 def _recent_maximum(values: Array) -> Array:

@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dropspin.comparisons.engines.options import calibrated_label
-from dropspin.comparisons.engines.registry import parsed
+from dropspin.comparisons.engines.registry import BUILT_IN, parsed
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.record.environments import without_paths
 from dropspin.comparisons.results.complete_folders import read_stored, sha256, written_whole
@@ -40,6 +40,9 @@ SCHEMA = schema_of(TEXTS, NUMBERS)
 BLANK: Row = dict.fromkeys(TEXTS, "") | dict.fromkeys(NUMBERS, math.nan)
 KEY = ("label", "scene", "dt", "metric")
 """The columns in which the rows of a file differ."""
+SIMULATION = KEY[:3]
+OF_SIMULATION = (*SIMULATION, "scene_digest", "adapter", "verdict", "reason", "trajectory", "cost", "median_cost", "relative_cost")
+"""The columns that all rows of a simulation share."""
 CONSTANT = ("engine", "release", "plan", "versions", "processor", "system", "python", "measured")
 MACHINE = ("processor", "system", "python")
 SAME = ("plan", "adapter", *MACHINE)
@@ -102,7 +105,7 @@ class Record:
         named = {"engine": engine, "release": release, "measured": date.today().isoformat()}
         whole = [{**BLANK, **common, **row, **named} for row in rows]
         for row in whole:
-            row["profile"] = "" if not row["label"] else "default" if calibrated_label(row["label"]) is not None else "calibrated"
+            row["profile"] = _profile(row["label"])
         earlier = [one for one in self.own(engine, release) if all(one[1][0][name] == whole[0][name] for name in MACHINE)]
         if any([row["reason"] for row in rows] == [whole[0]["reason"]] and not whole[0]["label"] for _, rows in earlier):
             return None
@@ -167,9 +170,15 @@ def _files(place: Path) -> list[Path]:
     return found
 
 
+def _profile(label: str) -> str:
+    """The profile of an engine with its options."""
+    return "" if not label else "default" if calibrated_label(label) is not None else "calibrated"
+
+
 def _verify(rows: Sequence[Row], engine: str, release: str) -> None:
     """Raise an error if a file has rows that no record has."""
     keys, units = ({tuple(row[name] for name in names) for row in rows} for names in (KEY, ("metric", "unit")))
+    simulations, motions = ({tuple(str(row[name]) for name in names) for row in rows} for names in (SIMULATION, OF_SIMULATION))
     texts = {row[name] for row in rows for name in TEXTS}  # of thousands of rows, a few hundred
     problems = {
         "no rows": not rows,
@@ -177,9 +186,12 @@ def _verify(rows: Sequence[Row], engine: str, release: str) -> None:
         "another engine or release than its name": {(row["engine"], row["release"]) for row in rows} != {(engine, release)},
         "rows of several machines, dates or plans": len({tuple(row[name] for name in CONSTANT) for row in rows}) > 1,
         "two rows of one result": len(keys) < len(rows),
+        "two motions, verdicts or costs of one simulation": len(motions) > len(simulations),
+        "an engine that dropspin does not have": engine not in BUILT_IN,
         "a metric that dropspin does not have": not {metric for metric, _ in units} <= {"", *METRICS},
         "another unit than its metric": any(unit != METRICS[metric].unit for metric, unit in units if metric in METRICS),
-        "a time step that is not above 0": any(row["scene"] and not row["dt"] > 0.0 for row in rows),
+        "a time step that is not above 0 and finite": any(row["scene"] and not 0.0 < row["dt"] < math.inf for row in rows),
+        "another profile than that of its label": any(row["profile"] != _profile(row["label"]) for row in rows),
         "a label of another engine": any(parsed(label)[0] != engine for label in {row["label"] for row in rows} - {""}),
         "a trajectory that is no SHA-256": not all(SHA256.fullmatch(row["trajectory"]) for row in rows),
         "a path": any(without_paths(text) != text for text in texts),

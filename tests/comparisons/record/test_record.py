@@ -184,6 +184,8 @@ def test_a_changed_digit_is_refused_with_the_name_of_the_file(two_records):
         ("metric", "beauty", "a metric that dropspin does not have"),
         ("verdict", "wonderful", "a verdict that dropspin does not have"),
         ("dt", -0.01, "a time step that is not above 0"),
+        ("dt", np.inf, "a time step that is not above 0 and finite"),
+        ("profile", "default", "another profile"),
         ("release", "1.3", "another engine or release than its name"),
         ("reason", "cannot open /home/someone/engine.so", "a path"),
         ("reason", "\x1b[2J", "control characters"),
@@ -201,6 +203,25 @@ def test_rows_that_no_record_has_are_refused(two_records, column, value, words):
     with pytest.raises(DropspinError, match=f"{re.escape(path.name)}: refused: .*{words}"):
         Record(mine).merge([str(path)])
     assert not (mine / OTHERS).exists()
+
+
+@pytest.mark.parametrize(
+    ("engine", "changes", "words"),
+    [
+        ("unicorn", [{"engine": "unicorn", "label": "", "profile": ""}], "an engine that dropspin does not have"),
+        ("wang", [{"trajectory": "0" * 64}, {"trajectory": "1" * 64, "metric": "energy_drift"}], "two motions"),
+        ("wang", [{"cost": 1.0}, {"cost": 2.0, "metric": "energy_drift"}], "costs of one simulation"),
+        ("wang", [{"verdict": "measured"}, {"verdict": "crashed", "metric": "energy_drift"}], "verdicts"),
+    ],
+)
+def test_files_of_unknown_engines_and_rows_that_contradict_each_other_are_refused(engine, changes, words, stub, tmp_path):
+    record(tmp_path, chosen=["1.0"])
+    [row] = pq.ParquetFile(*tmp_path.rglob("*.parquet")).read().to_pylist()
+    path = tmp_path / "sent.parquet"
+    pq.write_table(pa.Table.from_pylist([row | change for change in changes], SCHEMA), path)
+    path = path.rename(tmp_path / f"{engine}-1.0-{sha256(path.read_bytes())[:HASH]}.parquet")
+    with pytest.raises(DropspinError, match=f"refused: it has .*{words}"):
+        stored(path)
 
 
 @pytest.mark.parametrize(("name", "words"), [("results.parquet", "its name is not"), ("absent", "no file of a record")])

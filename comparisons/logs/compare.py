@@ -1,8 +1,9 @@
 """Engines compared with measured tosses, each from the state at the end of its flight: errors, what they come from, and which differ.
 
-An error is a mean over tosses with a 95 % interval, beside its noise floor: the difference between the engine's motions from that state and
-from states drawn from its covariance. The parts of an error are found by improving one thing after another, so that they sum up to it: the
-centre of mass, friction and restitution, the time step; then the noise floor, and what remains.
+An error is a mean over tosses with a 95 % interval, beside its noise floor: the difference between the engine's motion from that state,
+with the noise of the frames added, and those from states drawn from its covariance. The parts of an error are found by improving one thing
+after another, so that they sum up to it: the centre of mass, friction and restitution, the time step; then the noise floor, and what
+remains.
 """
 
 import math
@@ -37,7 +38,8 @@ from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_entries import engine_entries
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.scenarios.state import Array
+from dropspin.scenarios.rotations import about, length, multiply
+from dropspin.scenarios.state import ORIENTATION, POSITION, Array
 from dropspin.scenarios.variations import with_values
 
 ENGINES = ("mujoco", "mujoco[profile=default]", "pybullet[profile=default]", "wang[contact=sequential,law=coulomb]")
@@ -146,9 +148,9 @@ def log_compare(
     entries, flights = engine_entries(engines, ENGINES), flights_in(recording)
     header = flights.log.header
     starts = usable(flights)
-    measured, dt = recorded(starts), time_step(starts)
+    measured, white, dt = recorded(starts), np.array([start.white for start in starts]), time_step(starts)
     given = {entry.label: _given(flights, starts, dt, fit, entry.label) for entry in entries}
-    found, left_out = of_each_engine(entries, partial(_errors, header, given, measured), on_progress, resources, jobs)
+    found, left_out = of_each_engine(entries, partial(_errors, header, given, measured, white), on_progress, resources, jobs)
     rows, shares = chain.from_iterable(starmap(_rows, found.items())), chain.from_iterable(starmap(_shares, found.items()))
     pairs = {kind.quantity: _pairs(kind, found) for kind in COMPARED}
     apart = {quantity: {frozenset((one.first, one.second)) for one in some if one.differs} for quantity, some in pairs.items()}
@@ -180,11 +182,12 @@ def _errors(
     header: Header,
     given: Mapping[str, Mapping[str, Launches]],
     measured: Array,
+    white: Array,
     entry: EngineEntry,
     processes: EngineProcesses,
     report: Callable[[str], None],
 ) -> dict[str, Array] | Breakdown:
-    """The errors of each toss by what was given, shape (m, kinds); those of drawn starts are differences from the motion as given."""
+    """The errors of each toss by what was given, shape (m, kinds); those of drawn starts are from the motion as given with noise."""
     found: dict[str, Array] = {}
     nominal = measured
     for what, launched in given[entry.label].items():
@@ -196,12 +199,20 @@ def _errors(
             found[what] = np.full((len(measured), len(KINDS)), np.nan)
             continue
         t = launched.frames - launched.frames[:, :1]
-        reference = np.repeat(nominal, DRAWS, axis=0) if what == "drawn starts" else measured
+        reference = _noisy(*(np.repeat(of_toss, DRAWS, axis=0) for of_toss in (nominal, white))) if what == "drawn starts" else measured
         of_each = errors(header.body, header.gravity, header.tracked_from_centre, t, reference, seen[0])
         if what == "as given":
             nominal = seen[0]
         found[what] = of_each.reshape(len(measured), -1, len(KINDS)).mean(axis=1)
     return found
+
+
+def _noisy(poses: Array, white: Array) -> Array:
+    """Poses as they would be recorded, shape (m, n, 7), with white noise of standard deviations of shape (m, 6)."""
+    noise = np.random.default_rng([SEED, 1]).standard_normal((*poses.shape[:2], 6)) * white[:, np.newaxis]
+    angles, position = length(noise[..., 3:]), poses[..., POSITION] + noise[..., :3]
+    turn = about(noise[..., 3:] / angles[..., np.newaxis], angles)
+    return np.concatenate([position, multiply(turn, poses[..., ORIENTATION])], axis=-1)
 
 
 def _rows(label: str, found: Mapping[str, Array]) -> Iterator[Error]:
@@ -238,7 +249,7 @@ def _shares(label: str, found: Mapping[str, Array]) -> Iterator[Share]:
         improved = [(what, of_each[:, number]) for what, of_each in found.items() if what != "drawn starts"]
         parts = [(what, before - after) for (_, before), (what, after) in pairwise(improved)]
         floor = found["drawn starts"][:, number]
-        parts += [("start", floor), ("remaining", improved[-1][1] - floor)]
+        parts += [("noise floor", floor), ("remaining", improved[-1][1] - floor)]
         lower, upper = intervals_of_means(np.stack([values for _, values in parts], axis=1))
         for (what, values), low, high in zip(parts, lower.tolist(), upper.tolist(), strict=True):
             yield Share(label, kind.quantity, what, float(values.mean()), low, high)

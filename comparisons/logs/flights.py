@@ -38,6 +38,7 @@ class Start:
         frame: The last one, at which the state is.
         state: Shape (13,).
         covariance: Of position [m], rotation vector in the world frame [rad], velocity and spin, shape (12, 12).
+        white: Standard deviations of the white noise of a frame of the toss: of position [m] and rotation vector [rad], shape (6,).
     """
 
     toss: Toss
@@ -45,6 +46,7 @@ class Start:
     frame: int
     state: Array
     covariance: Array
+    white: Array
 
     @cached_property
     def deviations(self) -> Array:
@@ -128,7 +130,8 @@ def _start(rotor: Rotation, known: Array, position_noise: Noise, orientation_noi
     for part, block in ((moved_covariance, (0, 6)), (turned_covariance, (3, 9))):
         rows = np.concatenate([np.arange(start, start + 3) for start in block])
         covariance[np.ix_(rows, rows)] = part
-    return Start(flight.toss, flight.first, int(flight.rows[-1]), state, covariance)
+    white = np.repeat([position_noise.white, orientation_noise.white], 3)
+    return Start(flight.toss, flight.first, int(flight.rows[-1]), state, covariance, white)
 
 
 def flights_of(log: Log, acceleration: Array, report: Callable[[str, float], None] = ignore) -> Flights | None:

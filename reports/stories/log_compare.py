@@ -20,12 +20,12 @@ UNITS = {"1": (100.0, " [%]"), "rad": (180.0 / math.pi, " [°]"), "s": (1.0, " [
 OF = {"position": UNITS["1"], "orientation": UNITS["rad"]}
 """The factor and the unit, as in `UNITS`, of each quantity in the tables of differences and of parts."""
 LEGEND = (
-    "Means over {tosses} tosses with 95 % intervals. In brackets: the noise floor, which errors of the measured initial state cause. "
+    "Means over {tosses} tosses with 95 % intervals. In brackets: the noise floor, which noise in the recording causes. "
     "Positions are in percent of {length:.4g} mm, the largest extent of the body; energies are in percent of the initial energy."
 )
 IMPROVED = (
     "The first parts are decreases of the error by improvements that are made one after another: the centre of mass that the flights show, "
-    "friction and restitution that were fitted (with --fit), half the time step. Start: the noise floor. Remaining: the rest of the "
+    "friction and restitution that were fitted (with --fit), half the time step. Then the noise floor. Remaining: the rest of the "
     "error, due to the model of contact, the uncertainty of fitted values and the time step. A negative part is an increase."
 )
 AT = {"impact": "at impact", "+0.1 s": "0.1 s later", "mean": "mean over the motion", "end": "at the end"}

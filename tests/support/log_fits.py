@@ -61,8 +61,8 @@ def tosses(random, count, engine, friction, restitution, frames=FRAMES, height=0
     starts = []
     for number in range(count):
         toss = Toss(str(number), t, positions[number], orientations[number])
-        exact = Start(toss, 0, 0, states[number], covariance())
-        starts.append(Start(toss, 0, 0, exact.moved(errors[number : number + 1])[0], covariance()))
+        exact = Start(toss, 0, 0, states[number], covariance(), WHITE)
+        starts.append(Start(toss, 0, 0, exact.moved(errors[number : number + 1])[0], covariance(), WHITE))
     return recording(starts)
 
 

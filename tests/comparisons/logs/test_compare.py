@@ -1,8 +1,10 @@
 """Errors beside measured tosses: exact where they are planted, and engines apart where they differ."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from support.log_fits import HEADER, WANG, tosses
+from support.log_fits import HEADER, WANG, WHITE, tosses
 
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.logs.compare import log_compare
@@ -66,11 +68,20 @@ def test_engine_that_diverges_or_declines_costs_its_own_row(comparison):
 
 
 def test_error_of_the_engine_that_made_the_tosses_is_its_noise_floor(comparison):
-    """The noise of the record adds 2 mrad √3; a part of what is left is none of start, body or step."""
-    own, dead = (of(comparison.errors, engine=name, quantity="position", at="mean") for name in (WANG, Dead(OPTIONS).label))
-    assert own.value == pytest.approx(own.noise_floor, rel=0.75)
-    assert dead.value > 4.0 * own.value
+    own, dead = ({(row.quantity, row.at): row for row in comparison.errors if row.engine == name} for name in (WANG, Dead(OPTIONS).label))
+    for kind in (("position", "mean"), ("orientation", "impact"), ("orientation", "mean"), ("energy", "mean")):
+        assert own[kind].lower < own[kind].noise_floor < own[kind].upper, kind
+    assert dead["position", "mean"].value > 4.0 * own["position", "mean"].value
     assert of(comparison.errors, engine=WANG, quantity="resting face").value == 1.0
+
+
+def test_noise_floor_of_exact_starts_is_the_noise_of_a_frame():
+    """The mean length of three normal components is √(8/π) standard deviations."""
+    flights = tosses(np.random.default_rng(5), 5, WANG, 0.3, 0.3, frames=20)
+    known = [replace(start, covariance=1e-20 * np.eye(12), white=WHITE * (1 + number % 2)) for number, start in enumerate(flights.known)]
+    rows = log_compare(replace(flights, known=known), WANG, jobs=1).errors
+    for quantity, white in (("position", WHITE[0] / body_length(HEADER.body)), ("orientation", WHITE[3])):
+        assert of(rows, quantity=quantity, at="mean").noise_floor == pytest.approx(1.4 * np.sqrt(8.0 / np.pi) * white, rel=0.06)
 
 
 def test_parts_sum_up_to_the_error(comparison):

@@ -264,14 +264,10 @@ def _orders_that_fit(log: Log, ratios: Array, wide: Array) -> Iterator[Cause]:
 def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
     """The values that flights give, each with its interval or with what it needs."""
     header, found = flights.log.header, flights.moving
-    wide = found.half_widths()
     fall, (low, high) = -float(found.values[1]), _falls(flights, drag)
     yield Value("gravity", fall, low, high, "m/s²")
     yield Value("length scale", fall / header.gravity, low / header.gravity, high / header.gravity, "")
-    centres = np.asarray(header.tracked_point) - found.values[OFFSET]
-    widths = np.where(flights.show_offset, wide[OFFSET], np.inf)
-    for name, centre, error in zip(CENTRES, centres, widths, strict=True):
-        yield Value(name, centre, centre - error, centre + error, "m", OF_SIZE * header.body.size)
+    yield from centre_of_mass(flights)
     turning = _turning(flights)
     logarithms = np.clip([turning.values[:2], turning.half_widths()[:2]], -MOST_LOG, MOST_LOG).T
     for name, (value, error) in zip(RATIOS, logarithms.tolist(), strict=True):
@@ -284,6 +280,15 @@ def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
     for name, noise, unit in (("position", found.noise, "m"), ("orientation", flights.turning.noise, "rad")):
         yield Value(f"white noise of {name}", noise.white, math.nan, math.nan, unit)
         yield Value(f"slow noise of {name}", noise.slow, math.nan, math.nan, f"{unit}/s^1.5")
+
+
+def centre_of_mass(flights: Flights) -> Iterator[Value]:
+    """The coordinates of the centre of mass in the frame of the shape, by flights."""
+    header = flights.log.header
+    centres = np.asarray(header.tracked_point) - flights.moving.values[OFFSET]
+    widths = np.where(flights.show_offset, flights.moving.half_widths()[OFFSET], np.inf)
+    for name, centre, error in zip(CENTRES, centres, widths, strict=True):
+        yield Value(name, centre, centre - error, centre + error, "m", OF_SIZE * header.body.size)
 
 
 def _tosses(flights: Flights) -> list[TossFacts]:

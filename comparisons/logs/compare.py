@@ -2,8 +2,8 @@
 
 An error is a mean over tosses with a 95 % interval, beside its noise floor: the difference between the engine's motion from that state,
 with the noise of the frames added, and those from states drawn from its covariance. The parts of an error are found by improving one thing
-after another, so that they sum up to it: the centre of mass, friction and restitution, the time step; then the noise floor, and what
-remains.
+after another, so that they sum up to it: the centre of mass if the flights contradict the header's, friction and restitution, the time
+step; then the noise floor, and what remains.
 """
 
 import math
@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.logs.check import centre_of_mass
 from dropspin.comparisons.logs.continued_tosses import (
     Launches,
     flights_in,
@@ -28,7 +29,6 @@ from dropspin.comparisons.logs.continued_tosses import (
 )
 from dropspin.comparisons.logs.errors import KINDS, Kind, body_length, errors
 from dropspin.comparisons.logs.fit import LogFit
-from dropspin.comparisons.logs.flight import OFFSET
 from dropspin.comparisons.logs.flights import Flights, Start
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.intervals import groups, interval_of_share, intervals_of_means
@@ -162,14 +162,19 @@ def log_compare(
 def _given(flights: Flights, starts: Sequence[Start], dt: float, fit: LogFit | None, label: str) -> dict[str, Launches]:
     """What an engine continues: as given, from drawn starts, and with one thing after another improved."""
     header, random = flights.log.header, np.random.default_rng(SEED)
-    found = {"as given": launches(header, starts, np.array([start.state for start in starts]), dt)}
+    states = np.array([start.state for start in starts])
+    improved = launches(header, starts, states, dt)
+    found = {"as given": improved}
     drawn = np.concatenate([start.drawn(random, DRAWS) for start in starts])
     found["drawn starts"] = launches(header, [start for start in starts for _ in range(DRAWS)], drawn, dt)
-    centre = np.array(header.tracked_point) - flights.moving.values[OFFSET]
-    header = header.corrected({"body.center_of_mass": centre.tolist(), "body.inertia": header.body.inertia_tensor.tolist()})
-    moved = replace(flights, log=replace(flights.log, header=header))
-    states = np.array([start.state for start in usable(moved)])
-    found["centre of mass"] = improved = launches(header, starts, states, dt)
+    centre = header.body.centre.tolist()
+    for axis, shown in enumerate(centre_of_mass(flights)):
+        if shown.is_identifiable and not shown.low <= centre[axis] <= shown.high:
+            centre[axis] = shown.value
+    if centre != header.body.centre.tolist():
+        header = header.corrected({"body.center_of_mass": centre, "body.inertia": header.body.inertia_tensor.tolist()})
+        states = np.array([start.state for start in usable(replace(flights, log=replace(flights.log, header=header)))])
+        found["centre of mass"] = improved = launches(header, starts, states, dt)
     fitted = {one.parameter: one.value for one in fit.estimates if one.engine == label} if fit is not None else {}
     if fitted:
         improved = improved._replace(scene=with_values(improved.scene, "floor", **fitted))

@@ -24,9 +24,10 @@ LEGEND = (
     "Positions are in percent of {length:.4g} mm, the largest extent of the body; energies are in percent of the initial energy."
 )
 IMPROVED = (
-    "The first parts are decreases of the error by improvements that are made one after another: the centre of mass that the flights show, "
-    "friction and restitution that were fitted (with --fit), half the time step. Then the noise floor. Remaining: the rest of the "
-    "error, due to the model of contact, the uncertainty of fitted values and the time step. A negative part is an increase."
+    "The first parts are decreases of the error by improvements that are made one after another: the centre of mass, where the flights "
+    "contradict that of the header, friction and restitution that were fitted (with --fit), half the time step. Then the noise floor. "
+    "Remaining: the rest of the error, due to the model of contact, the uncertainty of fitted values and the time step. A negative part is "
+    "an increase."
 )
 AT = {"impact": "at impact", "+0.1 s": "0.1 s later", "mean": "mean over the motion", "end": "at the end"}
 

@@ -77,5 +77,7 @@ class KnownFlights(Flights):
 
 
 def recording(starts):
-    moving, turning = (Regression(np.zeros(6), Noise(white, 0.0), *np.zeros((3, 1)), 1) for white in WHITE[[0, 3]])
+    moving, turning = (
+        Regression(np.zeros(6), Noise(white, 0.0), np.ones(0), np.eye(6)[np.newaxis], np.zeros((1, 6)), 1) for white in WHITE[[0, 3]]
+    )
     return KnownFlights(Log(HEADER, tuple(start.toss for start in starts), "tosses", ()), moving, (), turning, starts)

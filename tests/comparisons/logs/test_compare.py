@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.log_fits import HEADER, WANG, WHITE, tosses
+from support.tosses import made
 
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.logs.compare import log_compare
@@ -89,6 +90,21 @@ def test_parts_sum_up_to_the_error(comparison):
         error = of(comparison.errors, engine="mujoco", quantity=quantity, at="mean")
         parts = [part.value for part in comparison.parts if (part.engine, part.quantity) == ("mujoco", quantity)]
         assert sum(parts) == pytest.approx(error.value)
+
+
+@pytest.mark.parametrize(
+    ("spin", "offset", "improves"),
+    [
+        pytest.param(0.0, 0.0, False, id="not-identifiable"),
+        pytest.param(5.0, 0.0, False, id="as-in-the-header"),
+        pytest.param(5.0, 0.01, True, id="elsewhere"),
+    ],
+)
+def test_centre_of_mass_is_improved_where_flights_contradict_the_header(spin, offset, improves):
+    floor = {"floor": {"friction": 0.3, "restitution": 0.3}}
+    log = made(8, 6, (2e-4, 2e-3), spin=spin, offset=(0.0, 0.0, offset), header=floor).log
+    parts = {share.part for share in log_compare(log, WANG, jobs=1).parts}
+    assert ("centre of mass" in parts) == improves
 
 
 def test_planted_errors_measure_as_themselves():

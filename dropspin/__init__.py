@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from dropspin.comparisons.logs.log import Log as Log
     from dropspin.comparisons.logs.log import Toss as Toss
     from dropspin.comparisons.logs.log import load_log as load_log
-    from dropspin.comparisons.measuring.contacts import contacts as contacts
+    from dropspin.comparisons.measuring.contact_laws import contacts as contacts
     from dropspin.comparisons.measuring.metrics import METRICS as METRICS
     from dropspin.comparisons.regressions.baseline import Baseline as Baseline
     from dropspin.comparisons.regressions.baseline import load_baseline as load_baseline

@@ -13,10 +13,10 @@ from mujoco import rollout
 from dropspin.comparisons.diagnosis.geometries import Part, at_point, lowest_of
 from dropspin.comparisons.diagnosis.loose_body import LIGHT, Changes, Drag, LooseBody
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
+from dropspin.comparisons.diagnosis.mujoco_changes import ignored
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
 from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of
 from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ELLIPTIC, ENUMERATIONS, OPTIONS, PLANE, MuJoCoFile
-from dropspin.comparisons.diagnosis.mujoco_ignored import ignored
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.engines.base import Diverged

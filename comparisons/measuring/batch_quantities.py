@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring import state_quantities as states_module
 from dropspin.comparisons.measuring.comparison import Comparison
+from dropspin.comparisons.measuring.contact_laws import contact_residuals
 from dropspin.comparisons.measuring.contact_runs import Mask, RowNumbers
-from dropspin.comparisons.measuring.contacts import contact_residuals
 from dropspin.comparisons.measuring.motion_quantities import Motions, Setup
 from dropspin.comparisons.measuring.requirements import obeys_contact_laws
 from dropspin.comparisons.measuring.state_quantities import States, StatesOfMany, is_touching

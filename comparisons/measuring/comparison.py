@@ -14,8 +14,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from dropspin.comparisons.measuring.contact_laws import ContactResiduals, contact_residuals
 from dropspin.comparisons.measuring.contact_runs import Mask, RowNumbers
-from dropspin.comparisons.measuring.contacts import ContactResiduals, contact_residuals
 from dropspin.comparisons.measuring.motion_quantities import Motions
 from dropspin.comparisons.measuring.state_quantities import States
 from dropspin.scenarios import Scenario, Trajectory, Truth

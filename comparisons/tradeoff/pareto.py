@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, PlainSerializer, PlainValidator
 
 from dropspin.comparisons.tradeoff.costs import WORLDS
-from dropspin.comparisons.tradeoff.errors import Ladder
+from dropspin.comparisons.tradeoff.ladder import Ladder
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.state import Array
 

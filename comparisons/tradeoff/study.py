@@ -21,7 +21,7 @@ from dropspin.comparisons.running.parallel import as_jobs, results_in_parallel
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.tradeoff.costs import WORLDS, cost, costs_per_world, load, memory_per_world
-from dropspin.comparisons.tradeoff.errors import BUDGET, Ladder, errors_over_steps
+from dropspin.comparisons.tradeoff.ladder import BUDGET, Ladder, errors_over_steps
 from dropspin.comparisons.tradeoff.pareto import CostPoint, TradeOff, spread
 from dropspin.scenarios import DropspinError, Scenario, truth_for
 from dropspin.scenarios.errors import verify_known

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from dropspin.comparisons.measuring.contacts import RESIDUALS, contacts
+from dropspin.comparisons.measuring.contact_laws import RESIDUALS, contacts
 from dropspin.comparisons.measuring.requirements import obeys_contact_laws
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.document import Rows

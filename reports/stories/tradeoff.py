@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.comparisons.tradeoff.errors import Ladder
+from dropspin.comparisons.tradeoff.ladder import Ladder
 from dropspin.comparisons.tradeoff.pareto import LEVEL, CostPoint, TradeOff, spread
 from dropspin.reports.document import Charts, Document, Heading, Part, Rows, Sentences, Table
 from dropspin.reports.plots.run_charts import tradeoff_charts

@@ -17,8 +17,9 @@ from dropspin.comparisons.running.driving import Breakdown, simulate
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.run import measure
-from dropspin.comparisons.tradeoff import costs, errors, study
-from dropspin.comparisons.tradeoff.errors import DIVISIONS, Ladder, output_interval
+from dropspin.comparisons.tradeoff import costs, study
+from dropspin.comparisons.tradeoff import ladder as ladder_module
+from dropspin.comparisons.tradeoff.ladder import DIVISIONS, Ladder, output_interval
 from dropspin.comparisons.tradeoff.pareto import CostPoint, TradeOff, spread
 from dropspin.comparisons.tradeoff.study import tradeoff
 from dropspin.scenarios import DropspinError, load
@@ -102,9 +103,11 @@ def test_step_is_recommended_only_if_finer_ones_have_errors(ended, recommended):
 def test_engine_whose_small_error_does_not_fall_is_compared():
     """An error of 1e-5 rad at all time steps is within 1e-3 rad; one of 0.1 rad is that of another motion."""
     tried = [(0.1 / 2**number, [1e-5, 1e-5]) for number in range(8)]
-    assert errors._left_out(SPIN, tried, "orientation_error", "") == ""
+    assert ladder_module._left_out(SPIN, tried, "orientation_error", "") == ""
     large = [(dt, [1e-5, 0.1]) for dt, _ in tried]
-    assert errors._left_out(SPIN, large, "orientation_error", "").startswith("no convergence observed: orientation error is 0.1 to 0.1 rad")
+    assert ladder_module._left_out(SPIN, large, "orientation_error", "").startswith(
+        "no convergence observed: orientation error is 0.1 to 0.1 rad"
+    )
 
 
 def test_recommendation_is_on_the_pareto_front_if_a_finer_step_took_less_time():
@@ -137,7 +140,7 @@ def short_timings():
     """Two rounds instead of nine, 400 steps with a floor: no assertion depends on the machine's speed."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study, "ROUNDS", 2)
-        patch.setattr(errors, "MOST_RECORDED", 400)
+        patch.setattr(ladder_module, "MOST_RECORDED", 400)
         yield
 
 
@@ -297,7 +300,7 @@ def test_errors_do_not_depend_on_the_number_of_jobs_and_costs_are_measured_alone
 
     monkeypatch.setattr(study, "errors_over_steps", errors_over_steps)
     monkeypatch.setattr(study, "_with_costs", with_costs)
-    monkeypatch.setattr(errors, "MOST_STEPS", 200)
+    monkeypatch.setattr(ladder_module, "MOST_STEPS", 200)
     engines = ["mujoco[integrator=rk4]", "wang[rotation=rk4]"]
     one, two = (tradeoff(SHORT, engines, worlds=[2], jobs=jobs) for jobs in (1, 2))
     assert one.ladders == two.ladders
@@ -408,9 +411,9 @@ class NoNumbers(Exact):
 
 @pytest.mark.parametrize(("engine", "why"), [(Never(), "no step is small enough"), (NoNumbers(), "the state is not finite at t = ")])
 def test_time_steps_without_an_error_have_the_reason(engine, why, monkeypatch):
-    monkeypatch.setattr(errors, "MOST_STEPS", 100)
+    monkeypatch.setattr(ladder_module, "MOST_STEPS", 100)
     with EngineProcesses(FIVE_MINUTES) as processes:
-        ladder = errors.errors_over_steps(EngineEntry(engine.name, engine), SHORT, ["orientation_error"] * 2, 1.0, processes)
+        ladder = ladder_module.errors_over_steps(EngineEntry(engine.name, engine), SHORT, ["orientation_error"] * 2, 1.0, processes)
     assert ladder.undefined.startswith(why)
     assert ladder.verdict is None
     assert (f": {why}" in ladder.left_out) == isinstance(engine, Never)
@@ -438,7 +441,7 @@ class Growing(Exact):
 
 
 def test_batch_that_diverges_where_a_single_simulation_does_has_no_fault(monkeypatch):
-    monkeypatch.setattr(errors, "MOST_STEPS", 30)
+    monkeypatch.setattr(ladder_module, "MOST_STEPS", 30)
     found = tradeoff(SHORT, Growing(), worlds=[2])
     [ladder] = found.ladders
     assert (ladder.verdict, ladder.no_batch_cost) == (None, "")
@@ -448,7 +451,7 @@ def test_batch_that_diverges_where_a_single_simulation_does_has_no_fault(monkeyp
 
 @pytest.fixture
 def _processor_time_of_the_steps(monkeypatch):
-    monkeypatch.setattr(errors, "processor_time", lambda: Clock.now)
+    monkeypatch.setattr(ladder_module, "processor_time", lambda: Clock.now)
 
 
 def test_angles_that_stay_large_at_coarse_steps_may_fall_at_finer_ones():
@@ -495,7 +498,7 @@ def test_every_engine_that_was_asked_for_has_a_ladder_with_the_reason_of_its_end
 
 
 def test_ladder_that_ends_at_the_longest_run_says_so(monkeypatch):
-    monkeypatch.setattr(errors, "MOST_STEPS", 60)
+    monkeypatch.setattr(ladder_module, "MOST_STEPS", 60)
     [ladder] = tradeoff(SHORT, ["mujoco"]).ladders
     assert (ladder.ended, ladder.reason) == ("longest_run", "a run at the next smaller time step would have more than 60 steps")
     assert 60 / 1.5 <= SHORT.steps(ladder.steps[-1][0]) <= 60

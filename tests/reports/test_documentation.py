@@ -158,12 +158,12 @@ def quoted_constants():
     from dropspin.comparisons.limits import runner
     from dropspin.comparisons.limits import study as limits
     from dropspin.comparisons.running.start_phases import START_PHASES
-    from dropspin.comparisons.tradeoff import costs, errors, pareto, study
+    from dropspin.comparisons.tradeoff import costs, ladder, pareto, study
 
     ladder = [
-        f"exceeds `--budget` ({errors.BUDGET:g} s)",
-        f"with a floor, {errors.MOST_RECORDED:,}",
-        f"above {errors.CONVERGED:g} of its largest",
+        f"exceeds `--budget` ({ladder.BUDGET:g} s)",
+        f"with a floor, {ladder.MOST_RECORDED:,}",
+        f"above {ladder.CONVERGED:g} of its largest",
     ]
     cost = [
         f"the median of {study.ROUNDS} rounds",

@@ -17,7 +17,7 @@ from dropspin.comparisons.running.run import run
 from dropspin.comparisons.sweeps.folder import read_sweep
 from dropspin.comparisons.sweeps.running import run_sweep
 from dropspin.comparisons.sweeps.spec import load_sweep
-from dropspin.comparisons.tradeoff.errors import Ladder
+from dropspin.comparisons.tradeoff.ladder import Ladder
 from dropspin.comparisons.tradeoff.pareto import CostPoint, TradeOff
 from dropspin.reports.run_folder import write_report
 from dropspin.reports.stories.tradeoff import TradeOffs

@@ -5,7 +5,7 @@ import json
 import pytest
 from support.cli import dropspin
 
-from dropspin.comparisons.tradeoff.errors import BUDGET
+from dropspin.comparisons.tradeoff.ladder import BUDGET
 from dropspin.reports.commands.tradeoff import tradeoff_command
 from dropspin.reports.stories.study import exit_code
 from dropspin.reports.study_files import read_study

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.cli import TERMINAL
 
-from dropspin.comparisons.tradeoff.errors import Ladder
+from dropspin.comparisons.tradeoff.ladder import Ladder
 from dropspin.comparisons.tradeoff.pareto import CostPoint, TradeOff
 from dropspin.reports.stories import tradeoff
 from dropspin.reports.study_files import write_study

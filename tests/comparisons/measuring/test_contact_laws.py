@@ -12,7 +12,7 @@ import dropspin as ds
 from dropspin import scenarios
 from dropspin.comparisons.measuring.batch_quantities import compute_cases
 from dropspin.comparisons.measuring.comparison import Comparison
-from dropspin.comparisons.measuring.contacts import RESIDUALS
+from dropspin.comparisons.measuring.contact_laws import RESIDUALS
 from dropspin.comparisons.measuring.requirements import obeys_contact_laws
 from dropspin.scenarios import Trajectory, truth_for
 

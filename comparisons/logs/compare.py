@@ -204,8 +204,9 @@ def _errors(
             found[what] = np.full((len(measured), len(KINDS)), np.nan)
             continue
         t = launched.frames - launched.frames[:, :1]
-        reference = _noisy(*(np.repeat(of_toss, DRAWS, axis=0) for of_toss in (nominal, white))) if what == "drawn starts" else measured
-        of_each = errors(header.body, header.gravity, header.tracked_from_centre, t, reference, seen[0])
+        noise = np.repeat(white, len(t) // len(white), axis=0)
+        reference = _noisy(np.repeat(nominal, DRAWS, axis=0), noise) if what == "drawn starts" else measured
+        of_each = errors(header.body, header.gravity, header.tracked_from_centre, noise, t, reference, seen[0])
         if what == "as given":
             nominal = seen[0]
         found[what] = of_each.reshape(len(measured), -1, len(KINDS)).mean(axis=1)
@@ -227,7 +228,7 @@ def _rows(label: str, found: Mapping[str, Array]) -> Iterator[Error]:
     for kind, of_kind, drawn, *ends in zip(KINDS, values.T, floor.T, lower, upper, strict=True):
         low, high = interval_of_share(of_kind) if kind.quantity == "resting face" else ends
         tosses = int(np.isfinite(of_kind).sum())
-        yield Error(label, *kind, _mean(of_kind), _mean(drawn), float(low), float(high), tosses)
+        yield Error(label, *kind, _mean(of_kind), _mean(drawn), float(np.maximum(low, 0.0)), float(high), tosses)
 
 
 def _mean(values: Array) -> float:

@@ -14,14 +14,16 @@ from dropspin.reports.plots.intervals import interval_rows
 from dropspin.reports.stories.log_findings import corrections
 from dropspin.reports.stories.numbers import formatted, grouped, left_out
 from dropspin.reports.stories.study import Records, Study, with_all_columns
+from dropspin.scenarios.text import counted
 
 UNITS = {"1": (100.0, " [%]"), "rad": (180.0 / math.pi, " [°]"), "s": (1.0, " [s]")}
 """By unit of a value, the factor that converts it to the unit that is shown, and this unit."""
 OF = {"position": UNITS["1"], "orientation": UNITS["rad"]}
 """The factor and the unit, as in `UNITS`, of each quantity in the tables of differences and of parts."""
 LEGEND = (
-    "Means over {tosses} tosses with 95 % intervals. In brackets: the noise floor, which noise in the recording causes. "
-    "Positions are in percent of {length:.4g} mm, the largest extent of the body; energies are in percent of the initial energy."
+    "Means over {tosses} tosses with 95 % intervals. In brackets: the noise floor, which noise in the recording causes, and the number of "
+    "tosses that have the error, if not all. Positions are in percent of {length:.4g} mm, the largest extent of the body; energies are in "
+    "percent of the initial energy."
 )
 IMPROVED = (
     "The first parts are decreases of the error by improvements that are made one after another: the centre of mass, where the flights "
@@ -52,7 +54,7 @@ class ComparedLog(Study):
         study, parts = self.comparison, list[Part]()
         if study.errors:
             parts += [
-                Table(list(_error_rows(study.errors)), left_out_first=["at impact", "0.1 s later"]),
+                Table(list(_error_rows(study.errors, study.tosses)), left_out_first=["at impact", "0.1 s later"]),
                 Paragraph(LEGEND.format(tosses=study.tosses, length=1e3 * study.length)),
                 Charts("errors", [_error_chart(quantity, study.errors) for quantity in OF]),
             ]
@@ -88,10 +90,11 @@ def _pair_chart(quantity: str, pairs: Sequence[Pair]) -> Chart:
     return interval_rows(f"difference of {quantity}{unit}", names, rows, "no difference")
 
 
-def _error_rows(errors: Sequence[Error]) -> Iterator[dict[str, str]]:
+def _error_rows(errors: Sequence[Error], most: int) -> Iterator[dict[str, str]]:
     for (engine, quantity), kinds in grouped(errors, lambda error: (error.engine, error.quantity)).items():
         scale, unit = UNITS[kinds[0].unit]
-        cells = {kind.at: f"{_interval(scale, kind.value, kind)} ({formatted(scale * kind.noise_floor)})" for kind in kinds}
+        fewer = {kind.at: f"; {counted(kind.tosses, 'toss', 'tosses')}" if kind.tosses < most else "" for kind in kinds}
+        cells = {kind.at: f"{_interval(scale, kind.value, kind)} ({formatted(scale * kind.noise_floor)}{fewer[kind.at]})" for kind in kinds}
         yield {"engine": engine, "error": quantity + unit} | {name: cells.get(at, "") for at, name in AT.items()}
 
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.log_fits import HEADER, WANG, WHITE, tosses
+from support.log_fits import HEADER, RATE, WANG, WHITE, quaternions, tosses
 from support.tosses import made
 
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.logs.compare import log_compare
-from dropspin.comparisons.logs.errors import KINDS, body_length, errors
+from dropspin.comparisons.logs.errors import KINDS, Kind, body_length, errors
 from dropspin.scenarios.rotations import about, multiply
 from dropspin.scenarios.state import ORIENTATION, POSITION
 from dropspin.scenarios.variations import with_values
@@ -122,7 +122,7 @@ def test_planted_errors_measure_as_themselves():
     later[:, 10:, 1] = measured[:, :-10, 1]
 
     def kinds(motion):
-        of_each = errors(HEADER.body, 9.81, np.zeros(3), t, measured, motion)
+        of_each = errors(HEADER.body, 9.81, np.zeros(3), np.zeros((2, 6)), t, measured, motion)
         return {(kind.quantity, kind.at): of_each[:, number] for number, kind in enumerate(KINDS)}
 
     planted, late = kinds(found), kinds(later)
@@ -134,6 +134,21 @@ def test_planted_errors_measure_as_themselves():
     assert late["rest time", "end"] == pytest.approx(0.1)
 
 
+@pytest.mark.parametrize(("noise", "speed"), [(0.0, 0.0), (3.0, 0.0), (5.0, 0.0), (0.0, 0.5), (5.0, 2.5)])
+def test_noise_does_not_decide_when_a_body_rests(noise, speed):
+    """Of 200 bodies that fall for 0.4 s and then turn at a speed [rad/s], with times the usual noise of a frame."""
+    t, white = np.tile(np.arange(150) / RATE, (200, 1)), np.tile(noise * WHITE, (200, 1))
+    exact = np.zeros((200, 150, 7))
+    exact[..., 1] = 4.905 * np.maximum(0.4 - t, 0.0) ** 2
+    exact[..., ORIENTATION] = about(np.array([0.0, 1.0, 0.0]), speed * t)
+    drawn = np.random.default_rng(9).normal(size=(200, 150, 6)) * np.maximum(noise, 1e-9) * WHITE
+    measured = np.concatenate([exact[..., POSITION] + drawn[..., :3], multiply(quaternions(drawn[..., 3:]), exact[..., ORIENTATION])], -1)
+    found = dict(zip(KINDS, errors(HEADER.body, 9.81, np.zeros(3), white, t, measured, exact).T, strict=True))[
+        Kind("rest time", "end", "s")
+    ]
+    assert np.isnan(found).all() if speed else (found < 1.5 / RATE).all()
+
+
 def test_energy_error_is_that_of_a_known_loss():
     """A body that moves at 0.9 of the speed has 0.81 of the kinetic energy, all there is without gravity."""
     t = np.tile(np.arange(20) * 0.01, (1, 1))
@@ -142,4 +157,4 @@ def test_energy_error_is_that_of_a_known_loss():
     found = measured.copy()
     found[..., 0] *= 0.9
     energy = [kind.quantity for kind in KINDS].index("energy")
-    assert errors(HEADER.body, 0.0, np.zeros(3), t, measured, found)[0, energy] == pytest.approx(1.0 - 0.81)
+    assert errors(HEADER.body, 0.0, np.zeros(3), np.zeros((1, 6)), t, measured, found)[0, energy] == pytest.approx(1.0 - 0.81)

@@ -33,6 +33,8 @@ SEPARATORS = {";": "semicolons", "\t": "tabs"}
 """That a table may have instead of commas."""
 LONGEST_NAME = 100
 """Characters of the name of a toss."""
+NO_NUMBER = ["", "nan", "NaN", "NA", "N/A", "null", "None"]
+"""What programs write where they have none; as the name of a toss it is a text."""
 Columns = dict[str, Any]
 """By name, a sequence of one value a row."""
 
@@ -66,7 +68,7 @@ def read_columns(path: Path, given: str, topic: str | None) -> tuple[dict[str, A
     if len(set(lengths.values())) > 1:
         raise DropspinError(f"{given}: the columns have different lengths: {shown(lengths)}; give one value a row.")
     count = lengths["x"]
-    names = np.array([_name(value) for value in columns.pop(TOSS, ["1"] * count)])
+    names = _names(given, columns.pop(TOSS, ["1"] * count))
     return {name: _numbers(given, name, values) for name, values in columns.items()}, names
 
 
@@ -104,7 +106,12 @@ def _csv(raw: bytes, _topic: str | None) -> Columns:
     names = list(map(str, first.iloc[0]))
     _verify_first_line(names)
     _verify(names)
-    options: dict[str, Any] = {"dtype": {TOSS: str}, "low_memory": False}
+    options: dict[str, Any] = {
+        "dtype": {TOSS: str},
+        "low_memory": False,
+        "keep_default_na": False,
+        "na_values": dict.fromkeys(NUMBERS, NO_NUMBER),
+    }
     with warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)  # it would leave out values
         try:
@@ -179,6 +186,15 @@ def _numbers(given: str, name: str, values: Any) -> Array:
     return found
 
 
-def _name(value: Any) -> str:
-    """The name of a toss: a whole number, or a text."""
-    return f"{value:g}" if isinstance(value, float) else str(value)[:LONGEST_NAME]
+def _names(given: str, values: Any) -> NDArray[np.str_]:
+    """The names of tosses: numbers or texts, of which different ones stay different."""
+    column = pd.Series(values)
+    whole = [int(value) if isinstance(value, float) and value.is_integer() else value for value in column.tolist()]
+    names = ["" if is_missing else str(value) for value, is_missing in zip(whole, column.isna(), strict=True)]
+    for row, name in enumerate(names, 1):
+        if not 0 < len(name) <= LONGEST_NAME:
+            what = f"a name of {len(name)} characters" if name else "no name"
+            raise DropspinError(
+                f"{given}: column {TOSS}: row {row} has {what}; give a number or a text of up to {LONGEST_NAME} characters."
+            )
+    return np.array(names)

@@ -139,6 +139,21 @@ def test_shipped_tosses_come_to_rest_on_a_face():
         assert toss.position[-1, 1] == pytest.approx(0.979 * 0.0524, abs=1.5e-3)
 
 
+@pytest.mark.parametrize(
+    ("ending", "names", "expected"),
+    [
+        ("csv", ["NA", "null"], ["NA", "null"]),
+        ("npz", [1700000000.0, 1700000001.0], ["1700000000", "1700000001"]),
+        ("npz", np.float32([1.0, 1.5]), ["1", "1.5"]),
+        ("parquet", [0.1234567, 0.1234568], ["0.1234567", "0.1234568"]),
+        ("mcap", [20260101, 20260102], ["20260101", "20260102"]),
+    ],
+)
+def test_tosses_of_different_names_are_different(tmp_path, ending, names, expected):
+    both = {name: np.repeat(values, 2) for name, values in POSE.items()} | {"toss": np.tile(names, FRAMES)}
+    assert [toss.name for toss in load_log(written(tmp_path, both, name=f"toss.{ending}")).tosses] == expected
+
+
 def changed(**values):
     """The columns with some of them changed or, for None, left out."""
     return {name: column for name, column in (POSE | values).items() if column is not None}
@@ -170,6 +185,8 @@ WRONG = {
     "decimal comma": (with_value("z", 5, '"0,5"'), "column z: row 6 has '0,5'"),
     "one row": ({name: values[:1] for name, values in POSE.items()}, "toss 1: got 1 state; give at least two"),
     "no row": ({name: values[:0] for name, values in POSE.items()}, "has no rows; give a row for each frame"),
+    "no toss": (changed(toss=["a"] * (FRAMES - 1) + [""]), "toss.csv: column toss: row 40 has no name; give a number or a text of up to"),
+    "long name of a toss": (changed(toss=["a" * 101] * FRAMES), "column toss: row 1 has a name of 101 characters; give a number or a"),
     "one row of a toss": (changed(toss=["a"] * (FRAMES - 1) + ["b"]), "toss b: got 1 state; give at least two"),
     "equal times": (with_times(lambda t: t.__setitem__(5, t[4])), "do not increase: 0.04 s is after 0.04 s; leave out one of the two"),
     "times back": (with_times(lambda t: t.__setitem__(5, 0.01)), "toss 1: the times do not increase: 0.01 s is after 0.04 s; give"),
@@ -206,6 +223,7 @@ ARRAYS = {
     "objects": (changed(z=np.array([{}] * FRAMES)), "z has shape (40,) and type object"),
     "lengths": (changed(z=T[:-1]), "the columns have different lengths"),
     "yes and no": (changed(z=T > 0.1), "z has shape (40,) and type bool"),
+    "no toss": (changed(toss=np.where(T > 0.1, np.nan, 1.0)), "toss.npz: column toss: row 12 has no name; give a number or a text"),
     "nan": (changed(z=np.where(T > 0.1, np.nan, T)), "column z: row 12 has no number"),
 }
 

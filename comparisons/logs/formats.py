@@ -155,7 +155,7 @@ def _mcap(raw: bytes, topic: str | None) -> Columns:
     except ImportError:
         raise DropspinError(f"MCAP files need a package that is not installed: {install_extra('mcap')}.") from None
     rows: list[Any] = []
-    topics: dict[str, None] = {}
+    topics, names = dict[str, None](), dict[str, None]()
     for _, channel, message in make_reader(io.BytesIO(raw)).iter_messages(topic, log_time_order=False):
         topics[channel.topic] = None
         rows.append(json.loads(message.data) if channel.message_encoding == "json" else None)
@@ -163,10 +163,11 @@ def _mcap(raw: bytes, topic: str | None) -> Columns:
             raise DropspinError(f"has several topics ({', '.join(topics)}); name one in the header, as topic.")
         if not isinstance(rows[-1], dict):
             raise DropspinError(f"a message of topic {channel.topic} is not a JSON object of the columns.")
-        _verify(rows[0], len(rows))
+        names.update(dict.fromkeys(rows[-1]))  # a column that only some messages have lacks numbers
+        _verify(names, len(rows))
     if not rows:
         raise DropspinError(f"has no message{'' if topic is None else f' of topic {topic}'}.")
-    return dict(pd.DataFrame.from_records(rows, columns=list(rows[0])))
+    return dict(pd.DataFrame.from_records(rows, columns=list(names)))
 
 
 FORMATS: dict[str, Callable[[bytes, str | None], Columns]] = {".csv": _csv, ".parquet": _parquet, ".npz": _npz, ".mcap": _mcap}
@@ -176,7 +177,9 @@ FORMATS: dict[str, Callable[[bytes, str | None], Columns]] = {".csv": _csv, ".pa
 def _numbers(given: str, name: str, values: Any) -> Array:
     """A column as numbers, all finite."""
     column = pd.Series(values)
-    numbers = pd.to_numeric(column, errors="coerce") if column.dtype != bool else pd.Series(np.full(len(column), np.nan))
+    numbers = pd.to_numeric(column, errors="coerce")
+    if column.dtype in (bool, object):
+        numbers = numbers.mask(np.array([isinstance(value, bool) for value in column.tolist()], dtype=bool))
     found = numbers.to_numpy(dtype=float, na_value=np.nan)
     if not (finite := np.isfinite(found)).all():
         row = int(np.argmin(finite))

@@ -59,7 +59,8 @@ def write_mcap(path, topics, encoding="json"):
         for topic, columns in topics.items():
             channel = writer.register_channel(topic, encoding, 0)
             for number, row in enumerate(zip(*columns.values(), strict=True)):
-                data = json.dumps(dict(zip(columns, map(float, row), strict=True))).encode()
+                given = {name: value for name, value in zip(columns, row, strict=True) if value is not None}
+                data = json.dumps(given, default=float).encode()
                 writer.add_message(channel, log_time=number, publish_time=number, data=data)
         writer.finish()
 
@@ -217,6 +218,8 @@ def test_wrong_values_and_columns_are_one_line(tmp_path, case):
     assert "\n" not in str(caught.value)
 
 
+LATER = np.where(T < 0.1, None, 1.0)
+"""A column that the first messages do not have."""
 ARRAYS = {
     "text": (changed(z=np.array(["a"] * FRAMES)), "toss.npz: column z: row 1 has 'a'"),
     "matrix": (changed(z=np.zeros((FRAMES, 2))), "z has shape (40, 2) and type float64; give one number a row"),
@@ -250,6 +253,10 @@ def test_wrong_array_is_one_line(tmp_path, case):
         ({"/a": POSE, "/b": POSE}, "json", "toss.mcap: has several topics (/a, /b); name one in the header, as topic"),
         ({"/a": POSE}, "ros1", "a message of topic /a is not a JSON object of the columns"),
         ({"/a": {"x": T}}, "json", "has no column y, z, qx, qy, qz, qw; it has x"),
+        ({"/a": with_value("x", 10, True)}, "json", "toss.mcap: column x: row 11 has True; give a finite number"),
+        ({"/a": with_value("x", 10, None)}, "json", "toss.mcap: column x: row 11 has no number; give a finite number"),
+        ({"/a": changed(**dict.fromkeys(("vx", "vy", "vz"), LATER))}, "json", "toss.mcap: column vx: row 1 has no number; give a finite"),
+        ({"/a": changed(foo=LATER)}, "json", "toss.mcap: column 'foo' is unknown"),
         ({}, "json", "has no message"),
     ],
 )

@@ -138,7 +138,7 @@ def _find(scene: str | Path) -> Path:
     )
 
 
-def read_toml(path: Path, name: str, kind: str = "scene", largest: int = MAX_FILE_SIZE) -> dict[str, Any]:
+def read_toml(path: Path, name: str, kind: str = "scene", largest: int = MAX_FILE_SIZE, *, is_merged: bool = False) -> dict[str, Any]:
     """The content of a TOML file.
 
     Args:
@@ -146,6 +146,7 @@ def read_toml(path: Path, name: str, kind: str = "scene", largest: int = MAX_FIL
         name: The path as the user gave it, for messages.
         kind: The word for such a file, for messages.
         largest: Largest allowed size [bytes].
+        is_merged: Whether git may have merged the file line by line; equal lines then count once.
 
     Raises:
         SceneError: The path is not a TOML file, or cannot be read.
@@ -154,7 +155,7 @@ def read_toml(path: Path, name: str, kind: str = "scene", largest: int = MAX_FIL
     try:
         raw = read_file(path, name, kind, largest)
         text = raw.decode("utf-8-sig")
-        content = tomllib.loads(text)
+        content = tomllib.loads(_each_once(text) if is_merged else text)
     except DropspinError as error:
         raise SceneError(str(error)) from None
     except UnicodeDecodeError as error:
@@ -168,6 +169,13 @@ def read_toml(path: Path, name: str, kind: str = "scene", largest: int = MAX_FIL
         raise SceneError(f"{name}: has a whole number {TOO_LARGE}.") from None
     _verify_sizes(content, name, kind)
     return content
+
+
+def _each_once(text: str) -> str:
+    """A text with an empty line in place of each line that it had before."""
+    lines = text.split("\n")
+    first = {line: len(lines) - 1 - number for number, line in enumerate(reversed(lines))}
+    return "\n".join(line if first[line] == number else "" for number, line in enumerate(lines))
 
 
 TOO_LARGE = "that exceeds the range of floating-point numbers"

@@ -35,7 +35,7 @@ def modules_after(program):
         ("from dropspin import comparisons", SLOW | {"jinja2", "rich", "dropspin.reports"}),
         ("from dropspin import reports", SLOW | {"jinja2", "rich"}),
         ("import dropspin.pytest_plugin", EVERYTHING | {"tomlkit", "filelock"}),
-        (COMMAND.format(["--help"]), EVERYTHING - {"click", "dropspin.reports"}),
+        (COMMAND.format(["--help"]), EVERYTHING - {"click", "dropspin.reports", "dropspin.comparisons"}),
         (COMMAND.format(["list"]), SLOW | {"scipy", "jinja2"}),
         (COMMAND.format(["list", "metrics"]), SLOW | {"scipy", "jinja2"}),
         (COMMAND.format(["show", "drop-ball"]), SLOW | {"scipy", "jinja2"}),

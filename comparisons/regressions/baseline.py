@@ -164,7 +164,7 @@ def load_baseline(path: str | Path) -> Baseline:
         DropspinError: The file is not a valid baseline. The message has the place, the value given and the values allowed.
     """
     where = str(path)
-    content = read_toml(Path(path), where, "baseline", LARGEST_FILE)
+    content = read_toml(Path(path), where, "baseline", LARGEST_FILE, is_merged=True)
     if content.get("format", FORMAT) != FORMAT:
         raise DropspinError(
             f"{where}: format {shown(content['format'])}, written by {_writer(content)}, cannot be read; "

@@ -19,7 +19,7 @@ class Turned(Exact):
 
     def __init__(self, off):
         super().__init__()
-        self.name, self.off = f"turned-{off:g}", off
+        self.name, self.off = f"turned-{1e3 * off:g}-mrad", off
 
     def prepare(self, scene, dt):
         spin = np.linalg.norm(scene.start.angular_velocity)
@@ -37,7 +37,7 @@ def test_smaller_steps_are_tried_where_the_nominal_one_is_not_sound():
     spin = np.linalg.norm(scene.start.angular_velocity)
     within = 0.02 * spin * 10.0 * 0.01 * 1.5  # the error at 15 ms
     found = find_limits(scene, [Turned(0.0), Turned(0.2)], ["spin"], dt=0.04, within=within, resources=QUICK)
-    converging, stays = (found.refinements[name] for name in ("turned-0", "turned-0.2"))
+    converging, stays = (found.refinements[name] for name in ("turned-0-mrad", "turned-200-mrad"))
     assert [(point.value, point.mode) for point in converging] == [(0.04, "inaccurate"), (0.02, "inaccurate"), (0.01, "sound")]
     assert converging[0].diagnosis.size == pytest.approx(0.02 * spin * 10.0 * 0.04, rel=1e-6)
     assert f"(tolerance {within:g})" in converging[0].diagnosis.message
@@ -47,10 +47,10 @@ def test_smaller_steps_are_tried_where_the_nominal_one_is_not_sound():
 
 def test_smaller_steps_are_part_of_the_scan_of_steps():
     found = find_limits(SPIN, [Turned(0.0)], ["step"], dt=2e-3, within=1.2e-3, resources=QUICK)
-    steps = found.steps("turned-0")
+    steps = found.steps("turned-0-mrad")
     assert [point.value for point in steps] == sorted(point.value for point in steps)
-    assert {point.value for point in found.refinements["turned-0"]} <= {point.value for point in steps}
-    accurate, _ = found.largest_steps("turned-0")
+    assert {point.value for point in found.refinements["turned-0-mrad"]} <= {point.value for point in steps}
+    accurate, _ = found.largest_steps("turned-0-mrad")
     assert 1e-3 <= accurate == pytest.approx(1.2e-3, rel=0.03)  # the error is dt s⁻¹
 
 

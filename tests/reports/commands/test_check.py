@@ -44,7 +44,7 @@ def test_check_judges_a_run_and_writes_junit_and_a_summary(release, repository, 
     if release == "failing":
         first = output.split("✗")[1]
         assert first.startswith(" drop-ball · my-engine · 0.008 s: restitution error is 0.005, accepted ")
-        assert "first measured; worse by 0.2, 1.67e+05 times its tolerance (and 2 other time steps); " in first
+        assert "first measured; worse by 0.005, 1.67e+05 times its tolerance (and 2 other time steps); " in first
         assert re.search(r"; \d+ other results of this scene fail \(", first)
         command = "dropspin run drop-ball -e my_engine:MyEngine --dt 0.008 --dt 0.004 --dt 0.002 --baseline dropspin-baseline.toml"
         assert f"Reproduce: {command} -o out/again" in first

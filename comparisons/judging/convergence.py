@@ -114,8 +114,7 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
         series: The metric at each time step.
         remark: Which time steps were added.
     """
-    dts = np.array([point.dt for point in series])
-    floor = negligible(scene, metric.unit)
+    dts, floor = np.array([point.dt for point in series]), negligible(scene, metric.unit)
     rounded = rounding(scene, metric.unit, claim.precision, np.array([point.steps for point in series], dtype=float))
 
     def judged(part: Part) -> Judged:
@@ -241,8 +240,7 @@ def _worst_parts(series: Sequence[SeriesPoint]) -> tuple[list[Part], dict[Part, 
     """
     resolved = sorted((point for point in series if np.isfinite(point.average.parts).all()), key=lambda point: point.dt)
     finest = _finest(resolved or series).average.parts
-    sizes = np.abs(finest)
-    dts = [[point.dt for point in resolved if len(point.average.parts) > flight] for flight in range(len(finest))]
+    sizes, dts = np.abs(finest), [[point.dt for point in resolved if len(point.average.parts) > flight] for flight in range(len(finest))]
     of_enough = sizes[: sum(map(is_sufficient, dts))]
     if not of_enough.size or of_enough.max() < LARGE_SHARE * sizes.max():
         return _with_other_sign(_largest(sizes), finest), {}

@@ -91,7 +91,8 @@ class Check:
     @property
     def reads_the_columns_right(self) -> bool:
         """Whether the header states units, axes, their order, quaternions and the floor correctly; an error of the scale is ignored."""
-        return not any(finding.kind in ("up", "unit", "quaternion", "body axes", "lengths", "floor", "below") for finding in self.findings)
+        wrong = {"up", "unit", "quaternion", "body axes", "lengths", "floor", "below", "end below"}
+        return wrong.isdisjoint(finding.kind for finding in self.findings)
 
 
 def log_check(recording: Flights | Log | str | Path, on_progress: Callable[[str, float], None] | None = None) -> Check:

@@ -226,8 +226,13 @@ def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:
         return
     if not flights.show_offset.all() or not math.isfinite(above):
         height, toss = min((highest(header, flight), flight.toss.name) for flight in flights.found)
+        last = [slice(flight.end - 1, flight.end) for flight in flights.found]
+        ends = [heights(header, one.toss.position[end], one.toss.orientation[end]) for one, end in zip(flights.found, last, strict=True)]
+        deep = 4.0 * found.noise.white + RESTS_NEAR * header.body.size
         if height < 0.0:
             yield Finding("below", -height, 0.0, toss)
+        elif (median := float(np.median(ends))) < -deep:
+            yield Finding("end below", -median, 0.0)
         return
     wide, off = found.half_widths(alarm), header.tracked_from_centre - found.values[OFFSET]
     by_scale = (abs(found.values[1] / header.gravity + 1.0) + wide[1] / header.gravity) * float(np.mean(np.abs(resting.expected)))

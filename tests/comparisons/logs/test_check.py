@@ -10,7 +10,7 @@ from support.tosses import BRICK, CUBE, made, turned
 
 from dropspin.comparisons.logs import check as checks
 from dropspin.comparisons.logs.check import CENTRES, RATIOS, Check, log_check
-from dropspin.comparisons.logs.flights import Flights, flights_of
+from dropspin.comparisons.logs.flights import Flights, flights_of, heights
 from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.log import Finding, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression
@@ -539,6 +539,20 @@ def test_bodies_that_fly_below_the_floor_are_a_finding_without_rests() -> None:
     found = only(log_check(changed(log, position=lambda toss: toss.position - [0.0, 3.0, 0.0])))
     assert found.kind == "below"
     assert 1.5 < found.value < 2.5
+
+
+@pytest.mark.parametrize(("depth", "kinds"), [(0.0, []), (0.06, ["end below"])])
+def test_flights_that_end_below_the_floor_are_a_finding_without_rests(depth: float, kinds: list[str]) -> None:
+    """Each toss is moved so that its last frame before the impact has this depth."""
+    tossed = made(1, 7, NOISE, durations=(0.2, 0.3), header={"body": CUBE, "floor": {"restitution": 0.3, "friction": 0.3}})
+    log, moved = tossed.log, []
+    for toss, impact in zip(log.tosses, tossed.impacts, strict=True):
+        last = slice(int(impact * 148.0), int(impact * 148.0) + 1)
+        height = heights(log.header, toss.position[last], toss.orientation[last])[0]
+        moved.append(replace(toss, position=toss.position - [0.0, height + depth, 0.0]))
+    findings = log_check(replace(log, tosses=tuple(moved))).findings
+    assert [one.kind for one in findings] == kinds
+    assert all(0.03 < one.value < 0.07 for one in findings)
 
 
 @pytest.mark.sample(1)

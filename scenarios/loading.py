@@ -146,7 +146,7 @@ def read_toml(path: Path, name: str, kind: str = "scene", largest: int = MAX_FIL
         name: The path as the user gave it, for messages.
         kind: The word for such a file, for messages.
         largest: Largest allowed size [bytes].
-        is_merged: Whether git may have merged the file line by line; equal lines then count once.
+        is_merged: Whether git may have merged the file line by line; equal lines then count once, unless it has headings.
 
     Raises:
         SceneError: The path is not a TOML file, or cannot be read.
@@ -155,7 +155,8 @@ def read_toml(path: Path, name: str, kind: str = "scene", largest: int = MAX_FIL
     try:
         raw = read_file(path, name, kind, largest)
         text = raw.decode("utf-8-sig")
-        content = tomllib.loads(_each_once(text) if is_merged else text)
+        has_headings = re.search(r"^\s*\[", text, re.MULTILINE) is not None  # an equal line below another heading is another one
+        content = tomllib.loads(_each_once(text) if is_merged and not has_headings else text)
     except DropspinError as error:
         raise SceneError(str(error)) from None
     except UnicodeDecodeError as error:

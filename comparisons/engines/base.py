@@ -112,7 +112,8 @@ class Engine(Configured, ABC):
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
-        if "prepare" in vars(cls) and "prepare_batch" not in vars(cls):
+        single, batch = (next(base for base in cls.__mro__ if name in vars(base)) for name in ("prepare", "prepare_batch"))
+        if cls.__mro__.index(single) < cls.__mro__.index(batch):
             cls.prepare_batch = Engine.prepare_batch  # type: ignore[method-assign]  # that of another adapter would not do what `prepare` does
 
     @property

@@ -173,6 +173,19 @@ def test_union_merge_keeps_what_two_branches_accepted(release, numpy, tmp_path):
     assert set(reasons.values()) == {"base", "livelier", "cheaper"}
 
 
+def test_equal_lines_below_different_headings_are_different_results(accepted, tmp_path):
+    write_baseline(accepted, tmp_path / "flat.toml")
+    lines = [line for line in (tmp_path / "flat.toml").read_text().splitlines() if line and line[0] != "#"]
+    headed = [line for line in lines if not line.startswith("results.")]
+    for line in lines:
+        if line.startswith("results."):
+            path, value = line.split(" = ", 1)
+            table, _, metric = path.rpartition(".")
+            headed += [f"[{table}.{metric}]", *re.sub(r"^\{|\}$", "", value).split(", ")]
+    (tmp_path / "headed.toml").write_text("\n".join(headed))
+    assert len(load_baseline(tmp_path / "headed.toml").results) == len(accepted.results)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -259,6 +259,7 @@ def test_adapter_that_extends_another_is_simulated_by_its_own_code():
     np.testing.assert_array_equal(run_jobs(sweep, 0, 1).state[0], states[-1])
     np.testing.assert_array_equal(record_batch(hasty, [scene, scene], 1e-2)[1].motion.states, states)
     assert states[-1][1] < ds.simulate(scene, "wang", 1e-2).states[-1][1] - 0.05
+    assert not type("Mixed", (type("Mixin", (), {"prepare": Hasty.prepare}), Wang), {"name": "mixed"})().steps_batches
 
 
 def test_requested_metrics_are_those_of_measure():

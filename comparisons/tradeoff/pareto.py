@@ -136,6 +136,7 @@ class TradeOff:
         best = {point.engine: point for point in sorted(self.points, key=lambda point: (self.reached(point), point.error), reverse=True)}
         on_front = {point.engine for point in front}
         inside = [best[ladder.engine] for ladder in self.ladders if ladder.engine in best.keys() - on_front]
+        inside = [point for point in inside if math.isfinite(self.reached(point))]
         return {point: next(other for other in front if self.reached(other) <= self.reached(point)) for point in inside}
 
     def recommendation(self, within: float) -> Recommendation | None:
@@ -178,7 +179,8 @@ class TradeOff:
 
     def _pareto_front(self, points: Sequence[CostPoint], cost: Callable[[CostPoint], float]) -> list[CostPoint]:
         front: list[CostPoint] = []
-        for point in sorted(points, key=lambda point: (cost(point), self.reached(point))):
+        finite = [point for point in points if math.isfinite(self.reached(point))]
+        for point in sorted(finite or points, key=lambda point: (cost(point), self.reached(point))):
             if not front or self.reached(point) < self.reached(front[-1]):
                 front.append(point)
         return front

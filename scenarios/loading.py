@@ -155,8 +155,7 @@ def read_toml(path: Path, name: str, kind: str = "scene", largest: int = MAX_FIL
     try:
         raw = read_file(path, name, kind, largest)
         text = raw.decode("utf-8-sig")
-        has_headings = re.search(r"^\s*\[", text, re.MULTILINE) is not None  # an equal line below another heading is another one
-        content = tomllib.loads(_each_once(text) if is_merged and not has_headings else text)
+        content = tomllib.loads(_each_once(text) if is_merged else text)
     except DropspinError as error:
         raise SceneError(str(error)) from None
     except UnicodeDecodeError as error:
@@ -173,7 +172,9 @@ def read_toml(path: Path, name: str, kind: str = "scene", largest: int = MAX_FIL
 
 
 def _each_once(text: str) -> str:
-    """A text with an empty line in place of each line that it had before."""
+    """A text with an empty line in place of each line that it had before; as it is with headings, below which equal lines differ."""
+    if re.search(r"^\s*\[", text, re.MULTILINE):
+        return text
     lines = text.split("\n")
     first = {line: len(lines) - 1 - number for number, line in enumerate(reversed(lines))}
     return "\n".join(line if first[line] == number else "" for number, line in enumerate(lines))

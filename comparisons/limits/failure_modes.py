@@ -91,8 +91,8 @@ def diagnose(motion: ExtendedMotion, within: float) -> Diagnosis:
             diagnoses += _tunnels(motion, motion.scene.floor)
             if not motion.scene.floor.ends:
                 diagnoses += [*_sinks(motion), *_never_rests(motion, whole)]
-    is_whole = motion.truth is None or motion.truth.covers_all(motion.nominal.t[-1])
-    return worst(diagnoses)._replace(compared_until=None if motion.truth is None or is_whole else motion.truth.horizon)
+    truth = motion.truth
+    return worst(diagnoses)._replace(compared_until=None if truth is None or truth.covers_all(motion.nominal.t[-1]) else truth.horizon)
 
 
 def _energy_gain(whole: Comparison) -> Iterator[Diagnosis]:

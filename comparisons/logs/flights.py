@@ -188,14 +188,14 @@ def _above_floor(header: Header, flights: list[Flight]) -> list[Flight]:
     """The flights without those of bodies that stay on the floor or below it; all, if these are half: the floor is elsewhere then."""
     if header.floor is None:
         return flights
-    high = [flight for flight in flights if highest(header, flight) > HIGH * header.body.size]
+    high = [flight for flight in flights if heights_in(header, flight).max() > HIGH * header.body.size]
     return high if 2 * len(high) > len(flights) else flights
 
 
-def highest(header: Header, flight: Flight) -> float:
-    """The largest height of the body's lowest point above the floor during a flight [m]."""
+def heights_in(header: Header, flight: Flight) -> Array:
+    """Heights of the body's lowest point above the floor in the frames of a flight [m], shape (n,)."""
     frames = slice(flight.first, flight.end)
-    return float(heights(header, flight.toss.position[frames], flight.toss.orientation[frames]).max())
+    return heights(header, flight.toss.position[frames], flight.toss.orientation[frames])
 
 
 def heights(header: Header, position: Array, orientation: Array) -> Array:

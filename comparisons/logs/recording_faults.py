@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, SURPRISING, Flight, departures, noise_of, surprise, window_size
-from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, heights, highest
+from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, heights, heights_in
 from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.intervals import intervals_of_means
 from dropspin.comparisons.logs.log import Cause, Finding
@@ -225,13 +225,12 @@ def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:
     if header.floor is None:
         return
     if not flights.show_offset.all() or not math.isfinite(above):
-        height, toss = min((highest(header, flight), flight.toss.name) for flight in flights.found)
-        last = [slice(flight.end - 1, flight.end) for flight in flights.found]
-        ends = [heights(header, one.toss.position[end], one.toss.orientation[end]) for one, end in zip(flights.found, last, strict=True)]
+        flown = [heights_in(header, flight) for flight in flights.found]
+        height, toss = min((float(one.max()), flight.toss.name) for one, flight in zip(flown, flights.found, strict=True))
         deep = 4.0 * found.noise.white + RESTS_NEAR * header.body.size
         if height < 0.0:
             yield Finding("below", -height, 0.0, toss)
-        elif (median := float(np.median(ends))) < -deep:
+        elif (median := float(np.median([one[-1] for one in flown]))) < -deep:
             yield Finding("end below", -median, 0.0)
         return
     wide, off = found.half_widths(alarm), header.tracked_from_centre - found.values[OFFSET]

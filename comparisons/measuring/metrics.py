@@ -11,10 +11,11 @@ from dropspin.comparisons.measuring import requirements
 from dropspin.comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison, Unresolved
 from dropspin.comparisons.measuring.metric import Applies, Components, Measure, Metric
 from dropspin.comparisons.measuring.motion_quantities import Motions, at_rows
-from dropspin.scenarios import Scenario, Trajectory, Truth, truth_for
+from dropspin.scenarios import Scenario, Trajectory, Truth
 from dropspin.scenarios.mechanics import apex
 from dropspin.scenarios.rotations import angle_between_orientations, length
 from dropspin.scenarios.state import Array
+from dropspin.scenarios.truths import exact_solution
 
 TURNED = 1e-3  # rad; a body that turns by less counts as not turning
 LANDING = 3  # steps, within which every engine has completed an impact
@@ -245,8 +246,7 @@ def leading_metric(scene: Scenario) -> str:
     """
     if scene.recording is not None:
         return "position_error"
-    truth = truth_for(scene)
-    assert truth is not None
+    truth = exact_solution(scene)
     names = {metric.name for metric in metrics_for(scene, truth)}
     if "bounce_height_error" in names:
         return "bounce_height_error"

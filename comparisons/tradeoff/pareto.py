@@ -133,10 +133,10 @@ class TradeOff:
     def dominated(self) -> dict[CostPoint, CostPoint]:
         """For each engine that is not on the Pareto front, its most accurate configuration and the cheapest one at least as accurate."""
         front = self.pareto_front
-        best = {point.engine: point for point in sorted(self.points, key=lambda point: (self.reached(point), point.error), reverse=True)}
+        finite = [point for point in self.points if math.isfinite(self.reached(point))]
+        best = {point.engine: point for point in sorted(finite, key=lambda point: (self.reached(point), point.error), reverse=True)}
         on_front = {point.engine for point in front}
         inside = [best[ladder.engine] for ladder in self.ladders if ladder.engine in best.keys() - on_front]
-        inside = [point for point in inside if math.isfinite(self.reached(point))]
         return {point: next(other for other in front if self.reached(other) <= self.reached(point)) for point in inside}
 
     def recommendation(self, within: float) -> Recommendation | None:

@@ -34,9 +34,11 @@ if TYPE_CHECKING:  # each engine is imported in its own process alone
 
 READERS = {".xml": ("mujoco",), ".mjcf": ("mujoco",), ".urdf": ("mujoco", "pybullet"), ".obj": ("mujoco",), ".stl": ("mujoco",)}
 """The engines that read a file, by its ending."""
-MESH = """<mujoco><asset><mesh name="mesh" file="{path}" inertia="{inertia}"/></asset><worldbody>
+MESH = """<mujoco><asset><mesh name="mesh" file="{path}" inertia="{inertia}" scale="{scale} {scale} {scale}"/></asset><worldbody>
 <body name="{name}"><freejoint/><geom type="mesh" mesh="mesh" density="{density:g}"/></body></worldbody></mujoco>"""
 """A model with a body whose only geometry is a mesh."""
+LONG = 10.0
+"""Length of a body from which a model may be in mm, read as m [m]."""
 IN_FORCE = ("name", "engine", "version", "dt", "mass", "surface", "friction", "friction_across")
 """What a diagnosis has as an engine has it in force."""
 QUESTIONS: tuple[Question, ...] = (fall, spin, tumble, worst_tumble, impact, rest, slide, creep, roll)
@@ -117,6 +119,7 @@ def diagnose(
     on: str | None = None,
     loose: bool = False,
     density: float = 1000.0,
+    scale: float = 1.0,
     restitution: float | None = None,
     friction: float | None = None,
     resources: ResourceLimits = ONE_MINUTE,
@@ -132,6 +135,7 @@ def diagnose(
         on: The name of the geometry on which the bodies land; by default, the plane or box below them.
         loose: Whether to diagnose also links that move on joints, each without its joint.
         density: Density of a mesh [kg/m³].
+        scale: Length of a unit of a mesh's coordinates [m].
         restitution: Target for the coefficient of restitution.
         friction: Target for the coefficient of friction.
         resources: The processor time [s] and memory [bytes] that one body may use.
@@ -165,7 +169,7 @@ def diagnose(
                 raise DropspinError(f"{given}: the mesh {why}, so that it has no volume; mend it, or give the body in an MJCF file.")
             is_inside_out = np.linalg.det(points[faces]).sum() < 0.0  # of which MuJoCo refuses the exact volume
             inertia_of = "legacy" if is_inside_out else "exact"
-            text = MESH.format(path=path.resolve(), inertia=inertia_of, name=path.stem, density=density)
+            text = MESH.format(path=path.resolve(), inertia=inertia_of, name=path.stem, density=density, scale=scale)
             path = Path(folder, "mesh.xml")
             path.write_text(text, encoding="utf-8")
         entries = list(map(present_entry, chosen))
@@ -254,6 +258,9 @@ def _diagnosed(
         frictions = (body.friction, body.friction_across)
         answers += [Answer("friction", COEFFICIENT, "1", measured=one) for one in frictions if not math.isnan(one)]
     answers += [Answer("file", key, "", findings=(Finding("changed", (key,), detail=made),)) for key, _, made in body.ignored]
+    if body.parts and (length := float(np.ptp(body.points, axis=0).max())) > LONG:
+        made = f"{length:.3g} m; dropspin reads SI units, and this may be a model in mm"
+        answers.append(Answer("file", "length of the body", "", findings=(Finding("changed", detail=made),)))
     found = BodyDiagnosis(
         **{field: getattr(body, field) for field in IN_FORCE},
         shapes=tuple(part.shape.shape for part in body.colliding),

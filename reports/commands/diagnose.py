@@ -15,6 +15,7 @@ from dropspin.reports.commands.options import POSITIVE, as_json, engines_option,
 @click.option("--on", metavar="GEOM", help="The plane or box to land on. [default: the first that the body collides with]")
 @click.option("--loose", is_flag=True, help="Also diagnose bodies on joints, each cut loose from its joint.")
 @click.option("--density", default=1000.0, type=POSITIVE, metavar="KG/M3", help="Density of a mesh.")
+@click.option("--scale", default=1.0, type=POSITIVE, metavar="METRES", help="Length of a unit of a mesh's coordinates: 0.001 for mm.")
 @click.option("--restitution", type=click.FloatRange(0.0, 1.0), metavar="E", help="Target for the coefficient of restitution.")
 @click.option("--friction", type=POSITIVE, metavar="MU", help="Target for the coefficient of friction.")
 @time_limit_option("an engine may use for one body")

@@ -93,6 +93,18 @@ def test_page_shows_what_the_command_prints(tmp_path, arguments):
     assert [line for line in shown if " ".join(line.split()) not in printed] == []
 
 
+def test_mesh_in_millimetres_is_named_and_its_unit_can_be_given(tmp_path, monkeypatch):
+    corners = [(0, 0, 0), (100, 0, 0), (0, 50, 0), (0, 0, 20)]
+    lines = [*(f"v {x} {y} {z}" for x, y, z in corners), "f 1 3 2", "f 1 2 4", "f 1 4 3", "f 2 3 4"]
+    (tmp_path / "part.obj").write_text("\n".join(lines))
+    monkeypatch.setattr("dropspin.comparisons.diagnosis.study.QUESTIONS", ())
+    in_metres = dropspin("diagnose", "part.obj", cwd=tmp_path, COLUMNS="200").stdout
+    assert "length of the body is 100 m; dropspin reads SI units, and this may be a model in mm." in in_metres
+    scaled = dropspin("diagnose", "part.obj", "--scale", "0.001", cwd=tmp_path, COLUMNS="200").stdout
+    assert scaled.startswith("part: mesh, 0.01667 kg;")  # 100 × 50 × 20 mm³ / 6 of water
+    assert "length of the body" not in scaled
+
+
 def test_what_needs_no_simulation_is_told_of_a_body_whose_simulation_breaks_down(model, monkeypatch):
     """The question after the inertia runs out of memory, as another one may run out of time."""
 

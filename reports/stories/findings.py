@@ -236,6 +236,11 @@ def ensemble_differences(results: Results) -> Iterator[str]:
             columns = zip(of_pair["metric"], of_pair["value"].abs(), of_pair["unit"], strict=True)
             means = [f"{metric.replace('_', ' ')} by {with_unit(f'{value:.2g}', unit)}" for metric, value, unit in columns]
             differing.append(f"{in_sentence(str(engine))} and {in_sentence(str(other))} in {listed(means)}")
+        if "rest_time" in set(rows["metric"]):
+            finest = [outcome for (name, _, dt), outcome in results.ensembles.items() if (name, dt) == (scene, rows["dt"].iloc[0])]
+            rested = [outcome.rest_time < outcome.t[-1] for outcome in finest]
+            if moving := max((int(np.sum(~each)) for each in rested), default=0):
+                differing.append(f"up to {moving} of {len(rested[0])} starts still move at the end, which counts as their rest time")
         yield f"Means over the starts of {scene}, which are not checked one by one, differ: {'; '.join(differing)}."
 
 

@@ -46,5 +46,5 @@ ENSEMBLE_METRICS = {
     "energy_halfway": EnsembleMetric("1", f"Energy at half the duration, {OF_SCENE}", lambda o: o.energy[:, SAMPLES // 2]),
     "energy_at_end": EnsembleMetric("1", f"Energy at the end, {OF_SCENE}", lambda o: o.energy[:, -1]),
     "rebound_height": EnsembleMetric("1", AFTER_CONTACT, lambda o: o.rebound),
-    "rest_time": EnsembleMetric("s", "Last time at which the body moved; the scene's end if it still moves.", lambda o: o.rest_time),
+    "rest_time": EnsembleMetric("s", "Last time of motion, as in rest_time_error; the end if the body still moves.", lambda o: o.rest_time),
 }

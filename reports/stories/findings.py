@@ -225,11 +225,15 @@ def beside_recordings(results: Results) -> Iterator[str]:
 
 
 def ensemble_differences(results: Results) -> Iterator[str]:
-    """For each ensemble, the means in which two engines differ at 95 % confidence at every time step; the values are of the finest one."""
+    """For each ensemble, the means in which two engines differ at 95 % confidence at every time step; the values are of the finest one.
+
+    Differences of at most `SMALLEST_STATED`, such as those of rounding, are left out.
+    """
     pairs = results.agreements[results.agreements["metric"].isin(ENSEMBLE_METRICS)].sort_values("dt", kind="stable")
     of = ["scene", "engine", "truth", "metric"]
     sides = pairs.assign(side=np.sign(pairs["lower"]) + np.sign(pairs["upper"])).groupby(of, sort=False)["side"]
     always = pairs[(sides.transform("min") > 0.0) | (sides.transform("max") < 0.0)].drop_duplicates(of)
+    always = always[always["value"].abs() > SMALLEST_STATED]
     for scene, rows in always.groupby("scene", sort=False):
         differing = []
         for (engine, other), of_pair in rows.groupby(["engine", "truth"], sort=False):

@@ -62,5 +62,9 @@ def test_means_that_do_not_differ_or_change_their_order_are_not_stated(coarser):
     assert differing(("rest_time", 0.002, *coarser), ("rest_time", 0.001, 0.05, 0.15)) == []
 
 
+def test_differences_of_rounding_are_not_stated():
+    assert differing(("energy_at_end", 0.002, 1e-16, 3e-16), ("energy_at_end", 0.001, 0.5e-15, 1.5e-15)) == []
+
+
 def test_other_differences_are_not_means():
     assert differing(("position_error", 0.001, 0.05, 0.15)) == []

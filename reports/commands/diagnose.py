@@ -35,8 +35,7 @@ def diagnose_command(file: str, output: str, json_output: bool, **options: Any) 
     from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar
 
-    with written_study(output, json_output, has_report=True) as keep:
-        with share_bar(os.path.basename(file)) as on_progress:
-            diagnosis = diagnose(file, **options, on_progress=on_progress)
+    with written_study(output, json_output, has_report=True) as keep, share_bar(os.path.basename(file)) as on_progress:
+        diagnosis = diagnose(file, **options, on_progress=on_progress)
         keep(Diagnosed(diagnosis=diagnosis))
     return 3 if diagnosis.broke_down else int(diagnosis.failed)

@@ -33,9 +33,8 @@ def log_compare_command(recording: str, fits: bool, output: str, json_output: bo
     from dropspin.reports.terminal.progress import share_bar
 
     options["engines"] = options["engines"] or ENGINES
-    with written_study(output, json_output, has_report=True) as keep:
-        with share_bar(recording) as on_progress:
-            flights = flights_in(recording)
-            fit = log_fit(flights, **options, on_progress=on_progress) if fits else None
-            comparison = log_compare(flights, fit=fit, **options, on_progress=on_progress)
+    with written_study(output, json_output, has_report=True) as keep, share_bar(recording) as on_progress:
+        flights = flights_in(recording)
+        fit = log_fit(flights, **options, on_progress=on_progress) if fits else None
+        comparison = log_compare(flights, fit=fit, **options, on_progress=on_progress)
         keep(ComparedLog(recording=recording, findings=list(log_check(flights).findings), comparison=comparison))

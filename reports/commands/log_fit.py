@@ -30,8 +30,7 @@ def log_fit_command(recording: str, output: str, json_output: bool, **options: A
     from dropspin.reports.study_files import written_study
     from dropspin.reports.terminal.progress import share_bar
 
-    with written_study(output, json_output, has_report=True) as keep:
-        with share_bar(recording) as on_progress:
-            flights = flights_in(recording)
-            fit = log_fit(flights, **options, on_progress=on_progress)
+    with written_study(output, json_output, has_report=True) as keep, share_bar(recording) as on_progress:
+        flights = flights_in(recording)
+        fit = log_fit(flights, **options, on_progress=on_progress)
         keep(FittedLog(recording=recording, findings=list(log_check(flights).findings), fit=fit))

@@ -31,8 +31,7 @@ def reproduce_command(names: tuple[str, ...], output: str, json_output: bool, **
     if len(names) > 1 and names[-1] not in source_names() and any(source.data for source in sources(names[:-1])):
         names, data = names[:-1], names[-1]
     chosen = sources(names)
-    with written_study(output, json_output) as keep:
-        with share_bar("reproduce") as on_progress:
-            results = reproduce(names, data=data, **options, on_progress=on_progress)
+    with written_study(output, json_output) as keep, share_bar("reproduce") as on_progress:
+        results = reproduce(names, data=data, **options, on_progress=on_progress)
         keep(Reproduction(sources=chosen, results=results))
     return exit_code(results, named=bool(names))

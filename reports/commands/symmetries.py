@@ -41,10 +41,9 @@ def symmetries_command(scenes: tuple[str, ...], dt: float, output: str, json_out
     from dropspin.reports.terminal.safe_output import echo
     from dropspin.scenarios import load
 
-    with written_study(output, json_output) as keep:
+    with written_study(output, json_output) as keep, share_bar("symmetries") as on_progress:
         loaded = list(map(load, scenes or SCENES))
-        with share_bar("symmetries") as on_progress:
-            findings = symmetries(loaded, dt=dt, **options, on_progress=on_progress)
+        findings = symmetries(loaded, dt=dt, **options, on_progress=on_progress)
         folder = keep(Symmetries(findings=findings))
         if worst := worst_lost(findings):
             page = symmetries_page(worst, {scene.name: scene for scene in loaded}, dt)

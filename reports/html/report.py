@@ -27,9 +27,9 @@ from dropspin.reports.replay import as_data, replay_of
 from dropspin.reports.stories import numbers
 from dropspin.reports.stories.contacts import worst_contacts
 from dropspin.reports.stories.error_budget import error_budgets
-from dropspin.reports.stories.impact_laws import NOTE
 from dropspin.reports.stories.matrix import CHOICE, explanations, legend_of_marks, step_times
 from dropspin.reports.stories.run import Overview
+from dropspin.reports.stories.words import WORDS
 
 
 def html_report(
@@ -68,7 +68,7 @@ def html_report(
         ensemble_metrics=ENSEMBLE_METRICS,
         start_phases=QUICK_START_PHASES if results.is_quick else START_PHASES,
         settings=first_settings(results.provenance),
-        note_on_laws=NOTE,
+        note_on_laws=WORDS["impact_laws"]["legend"],
     )
 
 

@@ -5,12 +5,6 @@ from dropspin.reports.document import Rows
 from dropspin.reports.stories.numbers import formatted, in_ms, quantity, unit
 from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, law_of
 
-NOTE = (
-    "Distances from each engine to the exact solution under each law of impacts with friction, in scenes in which the laws differ. Engines "
-    "are judged by the law of the scene (*). The other laws are other models, and distances to their solutions are not errors. A dash (–) "
-    "means that a law gives the same impacts as the law of the scene, or has no solution."
-)
-
 
 def law_rows(results: Results) -> Rows:
     """A row for each scene in which the laws differ and each engine with a motion; the law of the scene is marked by *."""

@@ -13,12 +13,9 @@ from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part
 from dropspin.reports.plots.run_charts import limits_charts
 from dropspin.reports.stories.numbers import duration, left_out
 from dropspin.reports.stories.study import Records, Study
+from dropspin.reports.stories.words import WORDS
 from dropspin.scenarios.text import counted
 
-ACCURATE_AND_STABLE = (
-    "Accurate: the engine is sound at this time step and at all smaller ones that were tested. Stable: at all of these time steps, "
-    "errors above the tolerance are the only failures."
-)
 COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterion", "size", "message", "compared_until")
 
 
@@ -43,7 +40,7 @@ class Limits(Study):
         if self.left_out:
             parts.append(Sentences(left_out(self.left_out)))
         steps = step_rows(self.scenes)
-        summary: list[Part] = [Heading("The largest steps"), Table(steps), Paragraph(ACCURATE_AND_STABLE)] if steps else []
+        summary: list[Part] = [Heading("The largest steps"), Table(steps), Paragraph(WORDS["limits"]["steps"])] if steps else []
         return Document("Where engines break down", parts, summary)
 
 

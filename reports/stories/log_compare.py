@@ -14,23 +14,13 @@ from dropspin.reports.plots.intervals import interval_rows
 from dropspin.reports.stories.log_findings import corrections
 from dropspin.reports.stories.numbers import formatted, grouped, left_out
 from dropspin.reports.stories.study import Records, Study, with_all_columns
+from dropspin.reports.stories.words import WORDS
 from dropspin.scenarios.text import counted
 
 UNITS = {"1": (100.0, " [%]"), "rad": (180.0 / math.pi, " [°]"), "s": (1.0, " [s]")}
 """By unit of a value, the factor that converts it to the unit that is shown, and this unit."""
 OF = {"position": UNITS["1"], "orientation": UNITS["rad"]}
 """The factor and the unit, as in `UNITS`, of each quantity in the tables of differences and of parts."""
-LEGEND = (
-    "Means over {tosses} tosses with 95 % intervals. In brackets: the noise floor, which noise in the recording causes, and the number of "
-    "tosses that have the error, if not all. Positions are in percent of {length:.4g} mm, the largest extent of the body; energies are in "
-    "percent of the initial energy."
-)
-IMPROVED = (
-    "The first parts are decreases of the error by improvements that are made one after another: the centre of mass, where the flights "
-    "contradict that of the header, friction and restitution that were fitted (with --fit), half the time step. Then the noise floor. "
-    "Remaining: the rest of the error, due to the model of contact, the uncertainty of fitted values and the time step. A negative part is "
-    "an increase."
-)
 AT = {"impact": "at impact", "+0.1 s": "0.1 s later", "mean": "mean over the motion", "end": "at the end"}
 
 
@@ -55,7 +45,7 @@ class ComparedLog(Study):
         if study.errors:
             parts += [
                 Table(list(_error_rows(study.errors, study.tosses)), left_out_first=["at impact", "0.1 s later"]),
-                Paragraph(LEGEND.format(tosses=study.tosses, length=1e3 * study.length)),
+                Paragraph(WORDS["log_compare"]["errors"].format(tosses=study.tosses, length=1e3 * study.length)),
                 Charts("errors", [_error_chart(quantity, study.errors) for quantity in OF]),
             ]
         if study.pairs:
@@ -67,7 +57,7 @@ class ComparedLog(Study):
         parts.append(Sentences([*_group_sentences(study), *left_out(study.left_out)]))
         if study.parts:
             heading = Heading("Parts of the mean errors over the motion", on_terminal=True)
-            parts += [heading, Table(list(_part_rows(study))), Paragraph(IMPROVED)]
+            parts += [heading, Table(list(_part_rows(study))), Paragraph(WORDS["log_compare"]["parts"])]
         return Document(
             f"Engines compared with {self.recording}", parts, [Sentences(corrections(self.recording, self.findings), style="bold")]
         )
@@ -118,11 +108,7 @@ def _group_sentences(study: LogComparison) -> list[str]:
     """A sentence on the groups for each quantity, and the meaning of the groups."""
     alike = {quantity: [" and ".join(group) for group in groups if len(group) > 1] for quantity, groups in study.groups.items()}
     sentences = [f"In {name}, these engines do not differ significantly: {'; '.join(groups)}." for name, groups in alike.items() if groups]
-    meaning = (
-        "The 95 % intervals of the differences hold for all pairs simultaneously. Engines of one group are not ranked. An engine is in two "
-        "groups if it does not differ significantly from any engine of either group."
-    )
-    return [*sentences, meaning] if study.pairs else []
+    return [*sentences, WORDS["log_compare"]["groups"]] if study.pairs else []
 
 
 def _part_rows(study: LogComparison) -> Iterator[dict[str, str]]:

@@ -12,23 +12,10 @@ from dropspin.reports.plots.intervals import interval_rows
 from dropspin.reports.stories.log_findings import corrections
 from dropspin.reports.stories.numbers import formatted, grouped, left_out
 from dropspin.reports.stories.study import Records, Study, with_all_columns
+from dropspin.reports.stories.words import WORDS
 
-TRANSFERS: Mapping[str, Mapping[str, str]] = {
-    "restitution": {
-        "equal": "Restitution transfers between {first} and {second}",
-        "undecided": "The tosses do not show that restitution transfers between {first} and {second}: use each value only with its engine",
-        "different": "Restitution does not transfer between {first} and {second}: it is a setting of the engine, not of the body",
-    },
-    "friction": {
-        "equal": "Friction transfers between {first} and {second}",
-        "undecided": "The tosses do not show that friction transfers between {first} and {second}",
-        "different": "Friction does not transfer between {first} and {second}: it depends on the engine's model of contact",
-    },
-}
-NOT_IDENTIFIED: Mapping[str, str] = {
-    "friction": "no toss slides, or the engine does not use friction; tosses that strike the floor at a flat angle would bound it",
-    "restitution": "the motions do not depend on restitution, or the engine does not use it",
-}
+TRANSFERS: Mapping[str, Mapping[str, str]] = WORDS["log_fit"]["transfers"]
+NOT_IDENTIFIED: Mapping[str, str] = WORDS["log_fit"]["not_identified"]
 UNTOUCHED = "no body touches the floor of the header in these frames; correct floor_height, or give more frames (--frames)"
 """Why neither parameter is identified then."""
 

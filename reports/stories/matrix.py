@@ -13,6 +13,7 @@ from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.conclusion import WITHIN
 from dropspin.comparisons.results.results import MODEL_ERROR, UNDECIDED, Results, Status
 from dropspin.reports.stories.numbers import Row, bound, capitalized, in_ms, quantity, short, sized, with_unit
+from dropspin.reports.stories.words import WORDS
 
 MOST_SCENES = 18
 """Largest number of rows on a terminal. Of more scenes, those in which no engine has a finding are left out first, then those with the
@@ -20,23 +21,7 @@ least severe findings.
 """
 WITHOUT_FINDING = frozenset({"passed", "measured", "declined", "no_truth"})
 
-MEANINGS = {
-    "passed": "within every bound; an error without a bound falls to 0 with dt",
-    f"passed ({UNDECIDED})": "within every bound; an error may remain as dt → 0",
-    "failed": "a check is outside its bound",
-    "failed (diverged)": "a state was not finite, or the engine reported a breakdown",
-    "failed (crashed)": "the engine raised an exception, or its process ended",
-    "failed (timed out)": "the engine exceeded the time limit",
-    "failed (broken)": "the adapter cannot be loaded",
-    "known fault": "an error that the scene's file lists as expected of this engine",
-    f"known fault ({MODEL_ERROR})": "an error that the scene's file lists as expected of this engine, and that remains as dt → 0",
-    "not judged (limited)": "a known limitation causes an error beyond its bound",
-    "not judged (measured)": "the results have no bounds",
-    f"not judged ({UNDECIDED})": "the results have no bounds, and the time steps do not show whether each error vanishes as dt → 0",
-    "not judged (no exact solution)": "there is no exact solution to compare with",
-    "not judged (declined)": "the engine or its adapter cannot run the scene",
-    "not judged (missing)": "the engine is not installed",
-}
+MEANINGS: dict[str, str] = WORDS["matrix"]["meanings"]
 """What each status of an engine in a scene means; the status is the worst over all metrics and time steps."""
 CHOICE = "Error: one metric for a row, that of its largest fault, else the leading metric."
 """Which error a row of the matrix shows."""

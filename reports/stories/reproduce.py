@@ -12,15 +12,12 @@ from dropspin.comparisons.published.sources import Source
 from dropspin.reports.document import Document, Heading, Paragraph, Part, Rows, Sentences, Table
 from dropspin.reports.stories.study import Records, Study
 from dropspin.reports.stories.study import exit_code as code_of
+from dropspin.reports.stories.words import WORDS
 from dropspin.scenarios.text import counted
 
 STATUSES: tuple[Status, ...] = get_args(Status)
-WORDS: dict[Status, str] = {"differs": "differs by", "error of the source": "error"}
+DIFFERENCES: dict[Status, str] = {"differs": "differs by", "error of the source": "error"}
 """The word before a difference, by status."""
-LEGEND = (
-    "Reproduced: the value has the digits that the source prints. Within: it is within the bound or the tolerance that the source states, "
-    "and counts as reproduced. Error: the published value minus the exact one. For comparison: the source does not have this value."
-)
 
 
 class Reproduction(Study):
@@ -43,7 +40,7 @@ class Reproduction(Study):
             parts += [Heading(f"{source.name}: {source.title}", on_terminal=True), Paragraph(citation), Paragraph(source.setting)]
             parts += [Table(_table(results)), Sentences(_notes(source, results), numbered=True)]
         parts += [Heading("All sources", on_terminal=True), Table(_summary(self.results))]
-        parts.append(Sentences([LEGEND, _verdict(self.results)], numbered=True))
+        parts.append(Sentences([WORDS["reproduce"]["legend"], _verdict(self.results)], numbered=True))
         return Document("Published results", parts)
 
 
@@ -59,8 +56,8 @@ def _table(results: Sequence[Result]) -> Rows:
 def _difference(result: Result) -> str:
     if result.status == "reproduced" and set(result.published) & set("<>≤±"):
         return "within"
-    word = WORDS.get(result.status, result.status)
-    return f"{word} {result.difference:.1e}" if result.status in WORDS and math.isfinite(result.difference) else word
+    word = DIFFERENCES.get(result.status, result.status)
+    return f"{word} {result.difference:.1e}" if result.status in DIFFERENCES and math.isfinite(result.difference) else word
 
 
 def _notes(source: Source, results: Sequence[Result]) -> list[str]:

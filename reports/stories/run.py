@@ -21,9 +21,10 @@ from dropspin.reports.stories.findings import (
     profile_comparisons,
     verdict_sentence,
 )
-from dropspin.reports.stories.impact_laws import NOTE, law_rows
+from dropspin.reports.stories.impact_laws import law_rows
 from dropspin.reports.stories.matrix import Leading, leading_errors, legend_of_marks, matrix_of
 from dropspin.reports.stories.numbers import listed
+from dropspin.reports.stories.words import WORDS
 from dropspin.scenarios.text import counted
 
 
@@ -90,7 +91,7 @@ def document(results: Results, summary: Overview, tables: Sequence[Part] = (), e
         {"scene": scene, **{engine: f"{status.mark} {status.words}" for engine, status in by_engine.items()}}
         for scene, by_engine in summary.statuses.items()
     ]
-    laws: list[Part] = [Paragraph(NOTE), Table(summary.laws)] if summary.laws else []
+    laws: list[Part] = [Paragraph(WORDS["impact_laws"]["legend"]), Table(summary.laws)] if summary.laws else []
     failed = [f"✗ {failure.sentence}" for failure in summary.failures]
     failures_listed = Sentences(failed, commands=[failure.reproduce for failure in summary.failures], on_terminal=False)
     versions = ", ".join(f"{name} {version or 'not installed'}" for name, version in results.provenance["versions"].items())

@@ -11,16 +11,11 @@ from dropspin.reports.document import Document, Paragraph, Sentences, Table
 from dropspin.reports.stories.matrix import level
 from dropspin.reports.stories.numbers import grouped
 from dropspin.reports.stories.study import Records, Study
+from dropspin.reports.stories.words import WORDS
 from dropspin.scenarios.text import counted
 
 COLUMNS = ("scene", "engine", "symmetry", "status", "difference", "step", "time", "reason")
-MEANINGS: dict[Status, str] = {
-    "kept": "✓ kept up to rounding",
-    "rounding": "≈ above 1e-5, but rounding explains it",
-    "nearly kept": "~ up to 1e-5, but more than rounding explains",
-    "lost": "✗ lost",
-    "not run": "– not run",
-}
+MEANINGS: dict[Status, str] = WORDS["symmetries"]["meanings"]
 """The mark of each status, and its meaning."""
 
 
@@ -71,10 +66,7 @@ def worst_lost(findings: Sequence[Finding]) -> list[Finding]:
 def legend(findings: Sequence[Finding]) -> str:
     """The meaning of the numbers, and of each mark that occurs."""
     marks = ", ".join(MEANINGS[status] for status in STATUSES if any(finding.status == status for finding in findings))
-    return (
-        "Each number is the largest difference between two motions that should be equal, over all scenes, in radians or relative to sizes "
-        f"and speeds. {marks}."
-    )
+    return f"{WORDS['symmetries']['legend']} {marks}."
 
 
 def sentences(findings: Sequence[Finding]) -> list[str]:

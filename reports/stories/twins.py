@@ -5,12 +5,7 @@ from collections.abc import Sequence
 
 from dropspin.comparisons.symmetries.twins import LEVELS, TwinFinding
 from dropspin.reports.document import Document, Sentences, Table
-
-LEGEND = (
-    "The columns of steps have the first step after which the motions differ at all, or by more than the size in the heading; step 0 is "
-    "the initial state. Differences are in radians, or relative to sizes and speeds. Rounding explains a difference if the motion of one "
-    "of the two engines changes by a similar amount or more when its initial state is perturbed by 16 eps (machine epsilon)."
-)
+from dropspin.reports.stories.words import WORDS
 
 
 def document(findings: Sequence[TwinFinding]) -> Document:
@@ -21,7 +16,7 @@ def document(findings: Sequence[TwinFinding]) -> Document:
         if finding.status == "not run"
     ]
     rows = Table(list(map(_row, findings)), left_out_first=["> 1e-12", "> 1e-09"])
-    return Document("Engines of the same algorithm", [rows, Sentences([LEGEND, *reasons])])
+    return Document("Engines of the same algorithm", [rows, Sentences([WORDS["twins"]["legend"], *reasons])])
 
 
 def _row(finding: TwinFinding) -> dict[str, str]:

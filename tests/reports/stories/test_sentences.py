@@ -13,8 +13,8 @@ from dropspin.comparisons.regressions.attribution import Attribution
 from dropspin.comparisons.regressions.changes import EqualMotions, SpeedChange
 from dropspin.comparisons.regressions.comparing import Changes
 from dropspin.comparisons.regressions.history import DEFINED, History
-from dropspin.comparisons.symmetries.findings import Finding
-from dropspin.reports.stories import compare, conform, history, numbers, record, reproduce, rerun, scene, symmetries
+from dropspin.comparisons.symmetries.findings import STATUSES, Finding
+from dropspin.reports.stories import compare, conform, history, log_fit, numbers, record, reproduce, rerun, scene, symmetries
 from dropspin.scenarios import load
 
 PASSED, DECLINED = CheckResult("a", "passed", "yes"), CheckResult("b", "declined", "no floor")
@@ -65,6 +65,12 @@ def unchanged(*names):
 
 def modelled(**tables):
     return ", ".join(scene.modelled(load({"name": "made", "duration": 1.0} | tables)))
+
+
+def test_every_status_and_verdict_has_words():
+    assert symmetries.MEANINGS.keys() == set(STATUSES)
+    assert log_fit.TRANSFERS.keys() == log_fit.NOT_IDENTIFIED.keys() == {"friction", "restitution"}
+    assert all(words.keys() == {"equal", "undecided", "different"} for words in log_fit.TRANSFERS.values())
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY, 
 from dropspin.comparisons.measuring.comparison import Unresolved
 from dropspin.comparisons.measuring.contact_runs import Mask
 from dropspin.comparisons.measuring.metric import Average, Metric
-from dropspin.comparisons.measuring.tolerances import negligible, rounding
+from dropspin.comparisons.measuring.tolerances import negligible, rounding, scale
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.state import Array
 
@@ -129,6 +129,8 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     has_value = not math.isnan(length.asymptotic_error)
     vector = _budget_of_components(scene, claim, metric, series, np.isfinite(errors), rounded) if has_value else None
     budget = length if vector is None else _corrected(length, vector, abs(float(errors[at])), max(floor, float(rounded[at])))
+    if budget.cause == "unresolved" and metric.name not in JUMPING and _grows(dts, errors, LARGE * scale(scene, metric.unit)):
+        budget = _without_limit(budget, float(errors[at]))
     order_tolerance = math.nan
     if budget.dts and metric.name not in JUMPING:
         used, limit = np.isin(dts, budget.dts), 0.0 if length.cause == "discretisation" else length.asymptotic_error
@@ -139,6 +141,23 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     is_open = deciding.cause == "unresolved" and has_value and float(np.nanmax(np.abs(errors))) > floor
     finest_error = series[at].average.value if is_sufficient(list(dts)) else math.nan
     return Convergence(budget, series[at].dt, order_tolerance, is_open, remark, finest_error)
+
+
+def _grows(dts: Array, errors: Array, large: float) -> bool:
+    """Whether an error grows at least as fast as 1/dt over the three finest time steps, and is large at the finest one.
+
+    An error that vanishes, a c dt + b c dt² + …, does so only if three of its terms cancel at the coarsest of these steps.
+    """
+    h, sizes = dts[finest_first := np.argsort(dts)[:3]], np.abs(errors[finest_first])
+    return is_sufficient(list(h)) and bool(sizes[0] > large and np.all(np.diff(sizes * h) <= 0.0))
+
+
+def _without_limit(budget: ErrorBudget, finest: float) -> ErrorBudget:
+    """The budget of an error that grows with finer time steps: at least the error at the finest of them remains."""
+    upper = max(budget.upper, finest) if finest > 0.0 else finest
+    lower = min(budget.lower, finest) if finest < 0.0 else finest
+    reason = "grows at least as fast as 1/dt at the finest time steps, and approaches no value"
+    return ErrorBudget("model", reason, finest, lower, upper)
 
 
 def beside_recording(result: Convergence, uncertainty: float) -> Convergence:
@@ -217,14 +236,14 @@ def _worst(series: Sequence[SeriesPoint], judged: Callable[[Part], Judged], floo
 def _worse(largest: Judged, other: Judged, floor: float) -> Judged:
     """The budget of the part that is largest at the finest step, or that of another one if it is worse and more of it may remain.
 
-    The interval of an unresolved one contains that of the other part, because either may be the larger one as dt → 0.
+    Without a model error its interval contains that of the other part, because either may be the larger one as dt → 0.
     """
     may_remain = _reach(other[0]) > max(_reach(largest[0]), floor)
     if may_remain and WORSE.get(other[0].cause, 0) > WORSE.get(largest[0].cause, 0):
         largest, other = other, largest
     (worse, errors), (second, _) = largest, other
-    if worse.cause == "unresolved" and not math.isnan(second.lower):
-        worse = replace(worse, lower=min(worse.lower, second.lower), upper=max(worse.upper, second.upper))
+    if worse.cause != "model" and (second.lower < worse.lower or second.upper > worse.upper):
+        worse = widened(replace(worse, lower=min(worse.lower, second.lower)), second.upper, float(np.nanmin(np.abs(errors))), floor)
     return worse, errors
 
 

@@ -219,7 +219,10 @@ def friction_cone_excess(case: Comparison) -> float:
 
 @_metric("1", "invariant", requirements.opposes_slip_left)
 def friction_push(case: Comparison) -> float:
-    """Largest product of friction impulse and remaining slip in its direction, in a time step, relative to the scene's energy."""
+    """Largest product of friction impulse and remaining slip in its direction, in a time step, relative to the scene's energy.
+
+    It includes the product of torsional friction, which is the change of the vertical angular momentum, and the vertical spin.
+    """
     return _largest(case.contacts.push)
 
 

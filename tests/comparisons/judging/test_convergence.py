@@ -119,6 +119,28 @@ def test_the_error_of_the_other_sign_may_be_the_one_that_remains():
     assert (found.cause, found.asymptotic_error) == ("model", pytest.approx(0.002, rel=1e-6))
 
 
+def test_interval_of_an_error_that_vanishes_contains_the_limit_of_the_other_sign():
+    """The largest loss vanishes; the smallest one, which is smaller at each step, ends as a gain of 3.5e-5."""
+    found = cause_of({dt: [[3.5e-5 - 0.105 * dt, -0.13 * dt]] for dt in (0.004, 0.002, 0.001)})
+    assert found.cause != "model"
+    assert found.lower < 0.0
+    assert found.upper > 3.5e-5
+    assert "vanishes" not in found.reason
+
+
+def test_error_that_grows_as_fast_as_the_inverse_time_step_is_a_model_error():
+    """That of an engine that ignores the time step, and simulates longer with finer ones; slower growth and small errors may be chance."""
+
+    def found(*sizes):
+        return cause_of({dt: [[size, 0.0]] for dt, size in zip((0.004, 0.002, 0.001), sizes, strict=True)})
+
+    grown = found(0.376, 15.3, 77.1)
+    assert (grown.cause, grown.lower) == ("model", 77.1)
+    assert "grows at least as fast as 1/dt" in grown.reason
+    assert found(0.02, 0.03, 0.04).cause == "unresolved"
+    assert found(0.376e-4, 15.3e-4, 77.1e-4).cause == "unresolved"
+
+
 def average(parts):
     """An average with these parts, without sampling noise."""
     return Average(np.array(parts, ndmin=1), *np.zeros((2, *np.shape(parts))))

@@ -7,44 +7,14 @@ from robox3d._ffi import ffi, lib
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Engine, Simulation
-from dropspin.comparisons.engines.options import Setting, calibrated_values
+from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
-from dropspin.comparisons.engines.rapier_scenes import GRIPPING, damping_of, refusal, surface_of, why_damping
+from dropspin.comparisons.engines.rapier_scenes import damping_of, refusal, surface_of
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.state import PARTS
 
-WORLD = {
-    "restitutionThreshold": Setting(1.0, "impact speed below which a body does not rebound", 0.0, "m/s, 1 by default", "m/s"),
-    "contactHertz": Setting(30.0, "frequency of contacts", unit="Hz"),
-    "contactDampingRatio": Setting(10.0, "damping ratio of contacts"),
-    "contactSpeed": Setting(3.0, "largest speed that corrects depth", unit="m/s"),
-    "maximumLinearSpeed": Setting(400.0, "largest speed", 1e15, "m/s, 400 by default", "m/s"),
-    "enableContinuous": Setting(True, "contacts between steps are found"),
-}
-BODY = {
-    "enableSleep": Setting(True, "the body may fall asleep", False, "never falls asleep; by default below 0.05 m/s"),
-    "sleepThreshold": Setting(0.05, "speed below which the body falls asleep", unit="m/s", needs=(("enableSleep", "true"),)),
-    "allowFastRotation": Setting(False, "no limit of the spin", True, "no limit of the spin"),
-    "enableContactRecycling": Setting(
-        True,
-        "contacts are kept while a body hardly moves",
-        False,
-        "contacts are found anew in each step; else a rocking block errs by 3.9 cm, not 8 mm",
-    ),
-    "linearDamping": Setting(
-        0.0, "damping", why=f"{why_damping('Box3D')}, with the substep for dt; angularDamping is the same", unit="1/s", is_computed=True
-    ),
-    "angularDamping": Setting(0.0, "damping of rotation", unit="1/s", is_computed=True),
-}
-SURFACE = {
-    "restitution": Setting(0.0, "of body and floor", is_computed=True),
-    "friction": Setting(
-        0.6, "of body and floor", why=f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution", is_computed=True
-    ),
-    "rollingResistance": Setting(0.0, "of body and floor, over the radius"),
-}
-STEP = {"substeps": Setting(4, "substeps of a step", why="Box3D's examples take as many", least=1)}
+STEP, WORLD, BODY, SURFACE = settings_beside(__file__).values()
 
 
 class Box3D(Engine):

@@ -1,58 +1,13 @@
 """The settings of brax that can be given, by the names of its `System` and of MJCF, and scenes in MJCF with them."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
-from dropspin.comparisons.engines.options import Setting, spelled
+from dropspin.comparisons.engines.options import settings_beside, spelled
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 
-SPRING, GENERALIZED = (("pipeline", "spring"),), (("pipeline", "generalized"),)
-FLIGHT = {
-    "vel_damping": Setting(
-        0.0,
-        "rate at which the velocity grows, negative to damp",
-        why="minus the scene's decay rate",
-        unit="1/s",
-        least=-math.inf,
-        is_computed=True,
-        needs=SPRING,
-    ),
-    "ang_damping": Setting(
-        0.0, "as vel_damping, of the spin", why="as vel_damping", unit="1/s", least=-math.inf, is_computed=True, needs=SPRING
-    ),
-    "matrix_inv_iterations": Setting(10, "steps that invert the mass matrix; with 0 it is inverted directly", needs=GENERALIZED),
-}
-"""With and without a floor."""
-CONTACT = {
-    "baumgarte_erp": Setting(
-        0.1,
-        "share of the depth that a step corrects",
-        0.0,
-        "0; the default, 0.1, adds a tenth of the penetration per step to the speed of a rebound",
-        most=1.0,
-        needs=SPRING,
-    ),
-    "elasticity": Setting(
-        0.0,
-        "restitution of the body; the mean of both acts",
-        why="the scene's restitution, of body and floor: brax takes the mean of both",
-        most=1.0,
-        is_computed=True,
-        needs=SPRING,
-    ),
-    "floor_elasticity": Setting(0.0, "restitution of the floor", most=1.0, is_computed=True, needs=SPRING),
-    "friction": Setting(1.0, "of the body; the larger acts", is_computed=True),
-    "floor_friction": Setting(1.0, "of the floor", is_computed=True),
-    "spring_mass_scale": Setting(0.0, "contacts have the mass to the power of 1 minus this", most=1.0, needs=SPRING),
-    "spring_inertia_scale": Setting(0.0, "as spring_mass_scale, of the moments of inertia", most=1.0, needs=SPRING),
-    "solref": Setting((0.02, 1.0), "time constant and damping ratio of contacts", unit="s, 1", least=-math.inf, needs=GENERALIZED),
-    "solimp": Setting((0.9, 0.95, 0.001, 0.5, 2.0), "impedance of contacts", unit="1, 1, m, 1, 1", needs=GENERALIZED),
-    "solver_iterations": Setting(100, "steps of the contact solver", least=1, needs=GENERALIZED),
-    "solver_maxls": Setting(20, "steps of the contact solver's line search", least=1, needs=GENERALIZED),
-}
-"""With a floor."""
+FLIGHT, CONTACT = settings_beside(__file__).values()
 SETTINGS = FLIGHT | CONTACT
 NUMERICS = (
     *("vel_damping", "ang_damping", "matrix_inv_iterations", "baumgarte_erp"),

@@ -9,48 +9,14 @@ import numpy as np
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.node_engine import NodeEngine
-from dropspin.comparisons.engines.options import Setting, calibrated_values
+from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import CANNON_ES
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import rotate
 
 GRIPPING = 1e9
 CORNERS_OF_A_FACE = 4
-WORLD = {
-    "frictionGravity": Setting(
-        0.0,
-        "gravity in the limit of friction; 0 for that of the world",
-        why="m/s: the weight's share of a contact in a step; with gravity, a box of 3 m/s and µ 0.3 stops at once",
-        unit="m/s²",
-        is_computed=True,
-    )
-}
-SOLVER = {
-    "iterations": Setting(10, "of the solver", 1000, "at 10 a turning box on a rough floor errs by 0.23 in angular momentum, not 0.16"),
-    "tolerance": Setting(1e-7, "at which the solver ends", why="N s, of all impulses; 1e-7 for every mass by default", is_computed=True),
-}
-CONTACT = {
-    "contactEquationStiffness": Setting(1e7, "of contacts", unit="N/m"),
-    "contactEquationRelaxation": Setting(
-        3.0, "of contacts", 1e9, "steps; at 3 a part of the depth is added to a rebound, and a ball of 0.5 has 0.61", "steps"
-    ),
-    "frictionEquationStiffness": Setting(1e7, "of friction", unit="N/m"),
-    "frictionEquationRelaxation": Setting(3.0, "of friction", 1e9, "steps; at 3 a contact keeps a thirteenth of its slip", "steps"),
-    "restitution": Setting(0.0, "of body and floor", is_computed=True, most=1.0),
-    "friction": Setting(0.3, "of body and floor", why=f"{GRIPPING:g} where the floor grips", is_computed=True),
-}
-BODY = {
-    "linearDamping": Setting(
-        0.01,
-        "share of the velocity that a second takes away",
-        why="1 - exp(-rate), of a second; 0.01 by default; angularDamping is the same",
-        is_computed=True,
-        most=1.0,
-    ),
-    "angularDamping": Setting(0.01, "share of the spin that a second takes away", is_computed=True, most=1.0),
-}
-SETTINGS = WORLD | SOLVER | CONTACT | BODY
-"""Effects were measured at 1 ms without the one setting."""
+WORLD, SOLVER, CONTACT, BODY = settings_beside(__file__).values()
 
 
 class CannonES(NodeEngine):
@@ -60,7 +26,7 @@ class CannonES(NodeEngine):
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
     groups: ClassVar = {"world": WORLD, "solver": SOLVER, "contact": CONTACT, "body": BODY}
-    settings: ClassVar = SETTINGS
+    settings: ClassVar = WORLD | SOLVER | CONTACT | BODY
 
     def declines(self, scene: Scenario) -> str | None:
         floor = scene.floor

@@ -7,9 +7,8 @@ import numpy as np
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, KnownLimitation, Simulation
-from dropspin.comparisons.engines.dart_settings import SETTINGS, WORLD
 from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE
-from dropspin.comparisons.engines.options import calibrated_values
+from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.bodies import Box
 from dropspin.scenarios.model import Scenario
@@ -17,6 +16,7 @@ from dropspin.scenarios.rotations import cross, rotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, Array
 from dropspin.scenarios.surfaces import Floor
 
+WORLD, SURFACE = settings_beside(__file__).values()
 DETECTORS = {"dart": "DARTCollisionDetector", "bullet": "BulletCollisionDetector", "ode": "OdeCollisionDetector"}
 
 
@@ -27,7 +27,7 @@ class Dart(Engine):
     shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
-    settings: ClassVar = SETTINGS
+    settings: ClassVar = WORLD | SURFACE
 
     def discretisation(self, scene: Scenario) -> str | None:
         """Free flight agrees with MuJoCo's Euler to 1e-13 (to 1e-7 below 1e-3 rad a step, where DART truncates a series)."""

@@ -14,8 +14,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
-from dropspin.comparisons.engines.drake_settings import PLANT, SETTINGS
-from dropspin.comparisons.engines.options import calibrated_values
+from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import ORIENTATION, Array
@@ -24,6 +23,7 @@ from dropspin.scenarios.surfaces import Floor
 logging.getLogger("drake").addFilter(lambda record: "half spaces" not in record.getMessage())  # a warning about deformable bodies
 
 LONGEST = 1e150
+PLANT, SURFACE = settings_beside(__file__).values()
 
 
 class Drake(Engine):
@@ -32,7 +32,7 @@ class Drake(Engine):
     name, order = "drake", 1.0
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
-    settings: ClassVar = SETTINGS
+    settings: ClassVar = PLANT | SURFACE
 
     def discretisation(self, scene: Scenario) -> str | None:
         """Semi-implicit Euler without spin; else ω is as in MuJoCo's Euler, but a step turns by 2 atan(|ω| dt/2), as in Wang's method."""
@@ -53,7 +53,7 @@ class Drake(Engine):
         friction = mapping.friction_of(floor, gripping=1e6)
         chosen: dict[str, Any] = {"friction": friction, "floor_friction": friction}
         if not self.is_default:
-            chosen |= calibrated_values(SETTINGS)
+            chosen |= calibrated_values(self.settings)
             chosen["discrete_contact_approximation"] = "sap" if isinstance(floor.friction, str) else "tamsi"
             chosen["stiffness"] = (1e9 * scene.body.mass, 1e12 * scene.body.mass)
         return chosen | self.given

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
 from dropspin.comparisons.engines.mapping import PROFILES
-from dropspin.comparisons.engines.options import Setting, calibrated_values
+from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import Array
@@ -24,35 +24,8 @@ INTEGRATORS = {
 }
 """The name of Exudyn's solver, and its order, by the option `integrator`."""
 OUTPUTS = [getattr(exu.OutputVariableType, name) for name in ("Position", "RotationMatrix", "Velocity", "AngularVelocity")]
-IMPLICIT = (("integrator", "generalized-alpha", "trapezoidal"),)
-TIME = {"adaptiveStep": Setting(True, "divides a step that fails", False, "never divides a step; one that fails ends the simulation")}
-NEWTON = {
-    "relativeTolerance": Setting(
-        1e-8,
-        "by which Newton's method decreases the residual of a step",
-        1e-13,
-        "of an implicit step's residual; with the defaults, 1e-8 and 1e-10, the motion depends on the units, by 4e-6",
-        needs=IMPLICIT,
-    ),
-    "absoluteTolerance": Setting(1e-10, "residual at which Newton's method ends", 0.0, "as relativeTolerance", needs=IMPLICIT),
-    "maxIterations": Setting(25, "of Newton's method", least=1, needs=IMPLICIT),
-    "useModifiedNewton": Setting(True, "keeps the Jacobian between steps", needs=IMPLICIT),
-}
-ALPHA = {
-    "spectralRadius": Setting(
-        0.9,
-        "of fast motion in a step: 1 for no damping",
-        why="Exudyn's own; at 1 it makes the errors of trapezoidal, which differ by 0.5 %",
-        most=1.0,
-        needs=(("integrator", "generalized-alpha"),),
-    ),
-    "lieGroupSimplifiedKinematicRelations": Setting(False, "rotations as of 2010, less accurate", needs=IMPLICIT),
-    "computeInitialAccelerations": Setting(True, "computes the accelerations at the start, else 0", needs=IMPLICIT),
-    "newmarkBeta": Setting(0.25, "of Newmark's method", needs=(("integrator", "trapezoidal"),)),
-    "newmarkGamma": Setting(0.5, "of Newmark's method", needs=(("integrator", "trapezoidal"),)),
-}
+TIME, NEWTON, ALPHA = settings_beside(__file__).values()
 SETTINGS = TIME | NEWTON | ALPHA
-"""By the names in Exudyn's `timeIntegration`, its `newton` and its `generalizedAlpha`. Effects were measured on tumbling bodies at 1 ms."""
 REASONS = {"damping": "N s/m, and N m s in the body's axes: m c and I c, which give the scene's decay"}
 REASONS |= {name: setting.why for name, setting in SETTINGS.items() if setting.why}
 

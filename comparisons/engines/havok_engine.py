@@ -9,37 +9,13 @@ import numpy as np
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.node_engine import NodeEngine
-from dropspin.comparisons.engines.options import Setting, calibrated_values
+from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import HAVOK
 from dropspin.comparisons.engines.rapier_scenes import refusal
 from dropspin.scenarios import Scenario
 
 GRIPPING, SLOWEST, FASTEST = 1e6, 1e-6, 100.0
-UNIT = 1.0 / 256.0
-WORLD = {
-    "unit": Setting(1.0, "length of a unit", UNIT, "m; Havok slows down what is slower than 0.1 units/s, by 0.31 units/s²", "m", 1e-9),
-    "idealStepTime": Setting(
-        1 / 60,
-        "a step has 4 dt over it substeps",
-        why="s, so that a step has four substeps; with one, as by default at 4 ms, a box on an edge rebounds with 0.35, not 0.5",
-        unit="s",
-        least=1e-9,
-        is_computed=True,
-    ),
-    "linearSpeedLimit": Setting(200.0, "units/s", 1e15, "units/s, 200 by default"),
-    "angularSpeedLimit": Setting(100.0, "largest spin", 1e15, "rad/s, 100 by default", "rad/s"),
-}
-BODY = {
-    "alwaysActive": Setting(False, "the body never falls asleep", True, "never falls asleep"),
-    "linearDamping": Setting(0.0, "damping", unit="1/s", is_computed=True),
-    "angularDamping": Setting(0.1, "damping of rotation", why="the scene's rate; 0.1 by default", unit="1/s", is_computed=True),
-}
-SURFACE = {
-    "restitution": Setting(0.0, "of body and floor", is_computed=True, most=1.0),
-    "friction": Setting(
-        0.5, "of body and floor", why=f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution", is_computed=True
-    ),
-}
+WORLD, BODY, SURFACE = settings_beside(__file__).values()
 
 
 class Havok(NodeEngine):

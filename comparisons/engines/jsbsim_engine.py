@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
 from dropspin.comparisons.engines.mapping import PROFILES
-from dropspin.comparisons.engines.options import Setting
+from dropspin.comparisons.engines.options import settings_beside
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import Array
@@ -31,17 +31,7 @@ INTEGRATORS = {
     "local-linearization": ((AB2, LOCAL, AB2, AB2), 2.0),
 }
 """JSBSim's numbers of the methods of `METHODS`, and the order that they have together, by the option `integrator`."""
-OF_VECTORS, OF_ROTATIONS = ("0", "1", "2", "3", "4", "5", "9"), tuple(map(str, range(10)))
-WHAT = "number of the method: 0 none, 1 Euler, 2 trapezoidal, 3 to 5 and 9 Adams-Bashforth"
-METHODS = {
-    "simulation/integrator/rate/rotational": Setting("1", WHAT, values=OF_VECTORS, is_computed=True),
-    "simulation/integrator/position/rotational": Setting(
-        "1", f"{WHAT}, 6 and 7 Buss, 8 local linearization", values=OF_ROTATIONS, is_computed=True
-    ),
-    "simulation/integrator/rate/translational": Setting("3", WHAT, values=OF_VECTORS, is_computed=True),
-    "simulation/integrator/position/translational": Setting("4", WHAT, values=OF_VECTORS, is_computed=True),
-}
-"""Set by the option `integrator`."""
+(METHODS,) = settings_beside(__file__).values()
 CENTRE = np.array([1.0, 1.0, 1.0]) / 3.0  # m, of the planet; JSBSim divides by the distance from it, which is hardly ever 0 there
 POUNDS = 32.174049  # JSBSim's weight of a slug; it takes the weight as the mass
 STATE = [*(f"position/eci-{axis}-ft" for axis in "xyz"), *(f"velocities/eci-{axis}-fps" for axis in "xyz")]

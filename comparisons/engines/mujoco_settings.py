@@ -1,15 +1,14 @@
 """The settings of MuJoCo that can be given, by their names in MJCF: defaults, calibrated values, and where a compiled model has them."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from dropspin.comparisons.engines.options import settings_in, spelled
+from dropspin.comparisons.engines.options import settings_beside, spelled
 
-CONTACT, OPTION, FLAGS, BODY = settings_in(Path(__file__).with_suffix(".toml")).values()
+CONTACT, OPTION, FLAGS, BODY = settings_beside(__file__).values()
 """Of the pairs of the body with floor and walls, in the default profile of their geoms; of the tables option and flag; of the free joint.
 
 Options and flags that the installed version has are in `SETTINGS`.

@@ -13,14 +13,15 @@ import odepy as ode
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Engine, Simulation
-from dropspin.comparisons.engines.ode_settings import BODY, GRIPPING, SETTINGS, SURFACE, WORLD
-from dropspin.comparisons.engines.options import Setting, calibrated_values
+from dropspin.comparisons.engines.options import Setting, calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.state import PARTS
 
+GRIPPING = 1e6
 CONTACTS = 8  # points of a contact at most; a box on a plane has four
+WORLD, BODY, SURFACE = settings_beside(__file__).values()
 ode.dInitODE2(0)
 
 
@@ -31,7 +32,7 @@ class ODE(Engine):
     shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box"), "beside": mapping.BESIDE, "solver": ("step", "quick")}
     representations: ClassVar = ("floor", "beside")
-    settings: ClassVar = SETTINGS
+    settings: ClassVar = WORLD | BODY | SURFACE
 
     def declines(self, scene: Scenario) -> str | None:
         return mapping.refusal_of_floor(scene, self.option("floor"))
@@ -51,7 +52,7 @@ class ODESimulation(Simulation):
         if floor := scene.floor:
             chosen |= {"mu": mapping.friction_of(floor, GRIPPING), "bounce": floor.restitution, "bounce_vel": floor.rest_speed}
         if not engine.is_default:
-            chosen |= calibrated_values(SETTINGS) | {"CFM": 1e-10 / scene.body.mass}
+            chosen |= calibrated_values(engine.settings) | {"CFM": 1e-10 / scene.body.mass}
         chosen |= engine.given
         ode.dWorldSetGravity(self._world, *scene.acceleration)
         _set("World", self._world, WORLD, chosen)

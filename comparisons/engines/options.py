@@ -103,9 +103,9 @@ class Setting(NamedTuple):
         return int(numbers[0]) if isinstance(self.default, int) else numbers[0]
 
 
-def settings_in(file: Path) -> dict[str, dict[str, Setting]]:
-    """The settings in a TOML file, by the table that has them; the keys of a setting are the attributes of `Setting`."""
-    tables = tomllib.loads(file.read_text(encoding="utf-8")).items()
+def settings_beside(file: str) -> dict[str, dict[str, Setting]]:
+    """The settings of the TOML file with the name of a Python file, by table; the keys of a setting are the attributes of `Setting`."""
+    tables = tomllib.loads(Path(file).with_suffix(".toml").read_text(encoding="utf-8")).items()
     return {
         kind: {name: Setting(**{key: _as_tuple(value) for key, value in one.items()}) for name, one in table.items()}
         for kind, table in tables

@@ -3,12 +3,11 @@
 The defaults were measured: each leaves the motions of a ball and a box as they are without the setting, bit for bit.
 """
 
-from pathlib import Path
 from typing import Any
 
-from dropspin.comparisons.engines.options import settings_in
+from dropspin.comparisons.engines.options import settings_beside
 
-WORLD, BODY = settings_in(Path(__file__).with_suffix(".toml")).values()
+WORLD, BODY = settings_beside(__file__).values()
 """Of setPhysicsEngineParameter, and of changeDynamics of the body."""
 OF_FLOOR = {"restitution": "1, so that the product is the scene's", "lateralFriction": "as floor_restitution"}
 FLOOR = {

@@ -14,15 +14,16 @@ import rapier3d
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation
-from dropspin.comparisons.engines.options import calibrated_values
+from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.rapier_scenes import damping_of, refusal, surface_of
-from dropspin.comparisons.engines.rapier_settings import BODY, SETTINGS, WORLD
 from dropspin.comparisons.measuring.predictions import spins_steadily
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.state import PARTS
 
+WORLD, BODY, SURFACE = settings_beside(__file__).values()
+FLOOR = {f"floor_{name}": setting._replace(what="of the floor") for name, setting in SURFACE.items()}
 FIRST_PROCESS = cache(os.getpid)  # the first one that simulates; it starts Rapier's threads, which all worlds share
 
 
@@ -33,7 +34,7 @@ class Rapier(Engine):
     shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
-    settings: ClassVar = SETTINGS
+    settings: ClassVar = WORLD | BODY | SURFACE | FLOOR
 
     def declines(self, scene: Scenario) -> str | None:
         return refusal(scene, self.option("floor"))

@@ -8,7 +8,6 @@ from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION
 
 GRIPPING = 1e6
-WHY_FRICTION = f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution: Rapier takes the average by default"
 
 
 def refusal(scene: Scenario, kind: str, engine: str = "Rapier") -> str | None:
@@ -25,11 +24,6 @@ def refusal(scene: Scenario, kind: str, engine: str = "Rapier") -> str | None:
     if np.any(np.sum(landings <= landings.min(axis=1, keepdims=True) + 1e-6 * body.size, axis=1) > 1):
         return f"{engine} rebounds with another restitution where several corners land at once, as here"
     return None
-
-
-def why_damping(engine: str = "Rapier") -> str:
-    """The reason for the coefficients of `damping_of`."""
-    return f"(exp(rate dt) - 1)/dt: {engine} divides by 1 + c dt, which gives the scene's decay"
 
 
 def damping_of(scene: Scenario, dt: float) -> dict[str, float]:

@@ -56,9 +56,8 @@ class Box3DSimulation(Simulation):
             floor.position = (0.0, -half, 0.0)
             self._add_shape(lib.b3CreateBody(self._world, ffi.addressof(floor)), (half, half, half))
         self._body, *_ = [self._add(one) for one in mapping.bodies_in(scene, engine.option("beside"))]
-        options = {name: engine.option(name) for name in engine.choices}
         library = ".".join(str(getattr(lib.b3GetVersion(), part)) for part in ("major", "minor", "revision"))
-        self.settings = {"version": version("robox3d"), "library": library, **options, **in_force}
+        self.settings = {"version": version("robox3d"), "library": library, **engine.options_in_force, **in_force}
 
     def _add_shape(self, body: Any, size: float | tuple[float, ...]) -> None:
         """Add a ball of a radius, or a box of half extents."""

@@ -87,7 +87,7 @@ class Worlds(BatchSimulation):
             self._state = _typed(_started(self._pipeline, self._system, from_world(initial_states(members))))
             self._run(0, 0)  # compiles
         made = {"version": version("brax"), "jax": jax.__version__, "mujoco-mjx": version("mujoco-mjx")}
-        made |= {"device": jax.devices()[0].device_kind} | {name: engine.option(name) for name in engine.choices}
+        made |= {"device": jax.devices()[0].device_kind} | engine.options_in_force
         names = (name for name in (SETTINGS if scene.floor else FLIGHT) if engine.unmet_need(name) is None)
         self.settings = made | {name: _in_force(self._system, name) for name in names}
 

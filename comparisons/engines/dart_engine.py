@@ -63,7 +63,7 @@ class DartSimulation(Simulation):
         self._scene, self._world = scene, dart.simulation.World()
         self._world.setTimeStep(dt)
         self._world.setGravity(scene.acceleration)
-        self.settings = {"version": version("dartpy"), **{name: engine.option(name) for name in engine.choices}}
+        self.settings = {"version": version("dartpy"), **engine.options_in_force}
         if scene.floor is not None:
             self.settings |= self._add_floor(engine.option("floor"), engine.chosen(scene.floor))
         self._body, *_ = [self._add_body(one) for one in mapping.bodies_in(scene, engine.option("beside"))]

@@ -71,7 +71,7 @@ class DrakeSimulation(Simulation):
         bodies = [self._add_body(one, self._plant.AddModelInstance(f"body {number}")) for number, one in enumerate(scenes)]
         self._body = bodies[0]
         self._plant.mutable_gravity_field().set_gravity_vector(scene.acceleration)
-        self.settings = {"version": version("drake"), **{name: engine.option(name) for name in engine.choices}}
+        self.settings = {"version": version("drake"), **engine.options_in_force}
         if scene.floor is not None:
             self.settings |= engine.chosen(scene, scene.floor)
             self._add_floor(scene, engine.option("floor"), bodies)

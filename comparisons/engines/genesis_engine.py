@@ -107,8 +107,7 @@ class Worlds(BatchSimulation):
         self._body.links[0].set_mass(body.mass)
         self._body.links[0].set_inertia(body.inertia_tensor)
         made = {"version": version("genesis-world"), "torch": version("torch"), "quadrants": version("quadrants")}
-        made |= {"device": str(genesis.device), "substeps": self._scene.sim.substeps}
-        self.settings = made | {name: engine.option(name) for name in engine.choices}
+        self.settings = made | {"device": str(genesis.device), "substeps": self._scene.sim.substeps} | engine.options_in_force
         if ground is not None:
             set_surfaces(self._body.geoms[0], ground.geoms[0], chosen)
             found = in_force(self._scene.rigid_solver, self._body.geoms[0], ground.geoms[0])

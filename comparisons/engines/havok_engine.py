@@ -11,10 +11,10 @@ from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.node_engine import NodeEngine
 from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import HAVOK
-from dropspin.comparisons.engines.rapier_scenes import refusal
+from dropspin.comparisons.engines.rapier_scenes import refusal, surface_of
 from dropspin.scenarios import Scenario
 
-GRIPPING, SLOWEST, FASTEST = 1e6, 1e-6, 100.0
+SLOWEST, FASTEST = 1e-6, 100.0
 WORLD, BODY, SURFACE = settings_beside(__file__).values()
 
 
@@ -33,9 +33,7 @@ class Havok(NodeEngine):
         return refusal(scene, "box", "Havok")
 
     def world_settings(self, scene: Scenario, dt: float) -> dict[str, Any]:
-        floor, rates = scene.floor, mapping.decay_rates(scene)
-        surface = {"restitution": floor.restitution, "friction": mapping.friction_of(floor, GRIPPING)} if floor else {}
-        damping = {f"{motion}Damping": rate for motion, rate in rates.items()}
+        surface, damping = surface_of(scene), {f"{motion}Damping": rate for motion, rate in mapping.decay_rates(scene).items()}
         if self.is_default:
             return {"world": {"unit": 1.0}, "body": damping if scene.damping else {}, "surface": surface}
         world = calibrated_values(WORLD) | {"idealStepTime": dt}

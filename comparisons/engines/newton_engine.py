@@ -111,7 +111,7 @@ class Worlds(BatchSimulation):
         self._now.body_qd.assign(rows[:, 7:])
         newton.eval_ik(self.model, self._now, self._now.joint_q, self._now.joint_qd)
         made = {"version": version("newton"), "warp": wp.config.version, "device": f"{wp.get_device()} ({wp.get_device().name})"}
-        self.settings = made | {name: engine.option(name) for name in engine.choices} | self._in_force(solver)
+        self.settings = made | engine.options_in_force | self._in_force(solver)
 
     def _in_force(self, solver: str) -> dict[str, Any]:
         """The settings as Newton has them; those of shapes are the first one's."""

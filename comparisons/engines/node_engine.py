@@ -41,7 +41,7 @@ class NodeEngine(Engine):
         """The settings with those that are given."""
         chosen = self.world_settings(scene, dt)
         for group, settings in self.groups.items():
-            chosen[group] |= {name: value for name, value in self.given.items() if name in settings}
+            chosen[group] |= self.given_of(settings)
         return chosen
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
@@ -52,7 +52,7 @@ class NodeSimulation(Simulation):
     """A world of an engine in Node.js."""
 
     def __init__(self, engine: NodeEngine, scene: Scenario, dt: float) -> None:
-        options = {name: engine.option(name) for name in engine.choices}
+        options = engine.options_in_force
         self._node = node(Path(inspect.getfile(type(engine))).with_suffix(".cjs"), engine.package)
         self._world = next(NUMBERS)
         floor = {"kind": options.get("floor", "plane"), "halfSize": mapping.FLOOR_HALF_SIZE} if scene.floor else None

@@ -47,7 +47,7 @@ class ODESimulation(Simulation):
     def __init__(self, scene: Scenario, dt: float, engine: ODE) -> None:
         self.velocity_lag, self._dt = 0.5 * dt, dt
         self._world, self._joints, self._contacts = ode.dWorldCreate(), ode.dJointGroupCreate(0), (ode.dContact * CONTACTS)()
-        rates, options = scene.damping.rates if scene.damping else {}, {name: engine.option(name) for name in engine.choices}
+        rates, options = scene.damping.rates if scene.damping else {}, engine.options_in_force
         chosen: dict[str, Any] = {f"{motion.title()}Damping": float(-np.expm1(-rate * dt)) for motion, rate in rates.items()}
         if floor := scene.floor:
             chosen |= {"mu": mapping.friction_of(floor, GRIPPING), "bounce": floor.restitution, "bounce_vel": floor.rest_speed}

@@ -217,9 +217,18 @@ class Configured:
         return self.options.get(name, self._default(name))
 
     @property
+    def options_in_force(self) -> dict[str, str]:
+        """The value of each option in `choices`."""
+        return {name: self.option(name) for name in self.choices}
+
+    @property
     def given(self) -> dict[str, Any]:
         """The values of the settings that were given explicitly."""
         return {name: self.settings[name].parsed(text) for name, text in self.options.items() if name in self.settings}
+
+    def given_of(self, kind: Collection[str]) -> dict[str, Any]:
+        """The values of the settings of a kind that were given explicitly."""
+        return {name: value for name, value in self.given.items() if name in kind}
 
     def unmet_need(self, setting: str) -> tuple[str, ...] | None:
         """An option and the values with which a setting would have an effect; None if the setting has an effect."""

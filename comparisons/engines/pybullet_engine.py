@@ -24,7 +24,7 @@ from dropspin.comparisons.engines.mapping import (
     refusal_of_hull,
     refusal_of_neighbour,
 )
-from dropspin.comparisons.engines.options import Setting, calibrated_values
+from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.engines.pybullet_limitations import LARGEST_TURN, MOST_BALLS, STRONGEST_FRICTION
 from dropspin.comparisons.engines.pybullet_settings import BODY, FLOOR, SETTINGS, WORLD
@@ -132,20 +132,16 @@ class PyBullet(Engine):
             return "box" if isinstance(scene.body, Box | OnAxis) and not self.is_default else "plane"
         return self.option("floor")
 
-    def _given(self, kind: Mapping[str, Setting]) -> dict[str, Any]:
-        """The settings of a kind that were given."""
-        return {name: value for name, value in self.given.items() if name in kind}
-
     def _parameters(self, scene: Scenario, dt: float) -> dict[str, Any]:
         """The parameters of the physics engine at a time step [s]."""
         if self.is_default:
-            return {"fixedTimeStep": dt} | self._given(WORLD)
+            return {"fixedTimeStep": dt} | self.given_of(WORLD)
         computed = {
             "fixedTimeStep": dt,
             "solverResidualThreshold": (RESIDUAL * float(np.linalg.norm(scene.acceleration)) * dt) ** 2,
             "restitutionVelocityThreshold": 0.0 if scene.floor is None else scene.floor.rest_speed,
         }
-        return calibrated_values(WORLD) | computed | self._given(WORLD)
+        return calibrated_values(WORLD) | computed | self.given_of(WORLD)
 
     def _dynamics(self, scene: Scenario) -> dict[str, Any]:
         """The properties of the body: contact, damping, sleep and clamp.
@@ -160,16 +156,16 @@ class PyBullet(Engine):
         if floor is not None:
             found = dict.fromkeys(COEFFICIENTS, 1.0) if scene.wall else _coefficients(floor)
         if self.is_default:
-            return found | rates | self._given(BODY)
+            return found | rates | self.given_of(BODY)
         is_clamped = not self.is_multibody or self.option("velocity_clamp") == "kept"
         without = {"contactProcessingThreshold": floor is None, "maxJointVelocity": is_clamped}
         found |= {name: value for name, value in calibrated_values(BODY).items() if not without.get(name)}
         found |= {name: float(-np.expm1(-rates.get(name, 0.0))) for name in ("linearDamping", "angularDamping")}
-        return found | self._given(BODY)
+        return found | self.given_of(BODY)
 
     def _surfaces(self, scene: Scenario) -> list[dict[str, Any]]:
         """The properties of the floor and each wall."""
-        of_floor = ({} if self.is_default else calibrated_values(FLOOR)) | self._given(FLOOR)
+        of_floor = ({} if self.is_default else calibrated_values(FLOOR)) | self.given_of(FLOOR)
         properties = {name.removeprefix("floor_"): value for name, value in of_floor.items()}
         return [(_coefficients(one) if scene.wall else dict.fromkeys(COEFFICIENTS, 1.0)) | properties for one in scene.surfaces]
 

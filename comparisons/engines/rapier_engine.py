@@ -58,8 +58,8 @@ class RapierSimulation(Simulation):
         if not engine.is_default:
             parameters |= calibrated_values(WORLD) | {"normalized_prediction_distance": float(np.linalg.norm(scene.acceleration)) * dt**2}
             dynamics = {"can_sleep": False, "allow_fast_rotation": True, "gyroscopic_forces": gyroscopic} | damping
-        parameters |= {name: value for name, value in given.items() if name in WORLD}
-        dynamics |= {name: value for name, value in given.items() if name in BODY}
+        parameters |= engine.given_of(WORLD)
+        dynamics |= engine.given_of(BODY)
         for name, value in parameters.items():
             setattr(self._world.integration_parameters, name, rapier3d.SpringCoefficients(*value) if isinstance(value, tuple) else value)
         self.velocity_lag = 0.5 * dt / self._world.integration_parameters.num_solver_iterations
@@ -69,9 +69,8 @@ class RapierSimulation(Simulation):
         self._body, *_ = [self._add_body(one, dynamics, surfaces[0]) for one in mapping.bodies_in(scene, engine.option("beside"))]
         if scene.floor:
             self._world.add_collider(_floor(engine.option("floor"), surfaces[1]))
-        form = {name: engine.option(name) for name in engine.choices}
         of_floor = {f"floor_{name}": value for name, value in surfaces[1].items()}
-        self.settings = {"version": version("rapier3d"), **form, **parameters, **dynamics, **surfaces[0], **of_floor}
+        self.settings = {"version": version("rapier3d"), **engine.options_in_force, **parameters, **dynamics, **surfaces[0], **of_floor}
 
     def _add_body(self, scene: Scenario, dynamics: Mapping[str, Any], surface: Mapping[str, Any]) -> Any:
         """Add a scene's body with its collider, if the scene has a floor."""

@@ -40,7 +40,7 @@ class Wang(Engine):
 
     def methods(self) -> reference_impl.Methods:
         """The chosen methods."""
-        return reference_impl.Methods(**{name: self.option(name) for name in self.choices})
+        return reference_impl.Methods(**self.options_in_force)
 
     def order_in(self, scene: Scenario) -> float | None:
         """The lowest order among the methods that the scene needs; None if one claims none, as contacts do, and factors of a step."""

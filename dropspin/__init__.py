@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from dropspin.comparisons.engines.base import OneWorld as OneWorld
     from dropspin.comparisons.engines.base import Simulation as Simulation
     from dropspin.comparisons.engines.options import NumericOption as NumericOption
-    from dropspin.comparisons.engines.options import Setting as Setting
     from dropspin.comparisons.engines.program_engine import ProgramEngine as ProgramEngine
     from dropspin.comparisons.engines.registry import engine as engine
     from dropspin.comparisons.engines.registry import engine_names as engine_names
+    from dropspin.comparisons.engines.settings import Setting as Setting
     from dropspin.comparisons.judging.error_budget import ErrorBudget as ErrorBudget
     from dropspin.comparisons.judging.error_budget import error_budget as error_budget
     from dropspin.comparisons.limits.study import LimitsStudy as LimitsStudy

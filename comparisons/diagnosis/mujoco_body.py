@@ -23,7 +23,7 @@ from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.mujoco_model import contact
 from dropspin.comparisons.engines.mujoco_settings import CONTACT, OPTION
 from dropspin.comparisons.engines.mujoco_simulation import from_world, full_state, quiet, to_world
-from dropspin.comparisons.engines.options import spelled
+from dropspin.comparisons.engines.settings import spelled
 from dropspin.scenarios.rotations import multiply, rotate
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.surfaces import Floor

@@ -15,7 +15,7 @@ from dropspin.comparisons.diagnosis.mujoco_elements import body_element, childre
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, without
 from dropspin.comparisons.diagnosis.xml_file import Element, Setting, tagged
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM, OPTION
-from dropspin.comparisons.engines.options import spelled
+from dropspin.comparisons.engines.settings import spelled
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
 

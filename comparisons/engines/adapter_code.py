@@ -14,7 +14,7 @@ from pathlib import Path
 
 from dropspin.comparisons.engines.program_engine import ProgramEngine
 
-PACKAGE, COMMON = "dropspin.comparisons.engines", frozenset({"base", "options", "packages"})
+PACKAGE, COMMON = "dropspin.comparisons.engines", frozenset({"base", "options", "packages", "settings"})
 INSTALLED = frozenset({"site-packages", "dist-packages"})
 LIBRARIES = frozenset({".so", ".dylib", ".dll", ".pyd"})
 STANDARD = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib"))

@@ -7,9 +7,9 @@ from robox3d._ffi import ffi, lib
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Engine, Simulation
-from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.rapier_scenes import damping_of, refusal, surface_of
+from dropspin.comparisons.engines.settings import calibrated_values, settings_beside
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.state import PARTS

@@ -15,8 +15,8 @@ from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, OneWorld, Simulation
 from dropspin.comparisons.engines.brax_settings import FLIGHT, OF_SHAPES, SETTINGS, description
 from dropspin.comparisons.engines.mujoco_simulation import from_world
-from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.packages import version
+from dropspin.comparisons.engines.settings import calibrated_values
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.model import initial_states
 

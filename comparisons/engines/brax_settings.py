@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from dropspin.comparisons.engines.options import settings_beside, spelled
+from dropspin.comparisons.engines.settings import settings_beside, spelled
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 

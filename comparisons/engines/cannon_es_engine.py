@@ -9,8 +9,8 @@ import numpy as np
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.node_engine import NodeEngine
-from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import CANNON_ES
+from dropspin.comparisons.engines.settings import calibrated_values, settings_beside
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import rotate
 

@@ -8,8 +8,8 @@ import numpy as np
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, KnownLimitation, Simulation
 from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE
-from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
+from dropspin.comparisons.engines.settings import calibrated_values, settings_beside
 from dropspin.scenarios.bodies import Box
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import cross, rotate

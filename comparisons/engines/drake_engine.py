@@ -14,8 +14,8 @@ from pydrake.systems.framework import DiagramBuilder
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
-from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
+from dropspin.comparisons.engines.settings import calibrated_values, settings_beside
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import ORIENTATION, Array
 from dropspin.scenarios.surfaces import Floor

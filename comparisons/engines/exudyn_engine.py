@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
 from dropspin.comparisons.engines.mapping import PROFILES
-from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
+from dropspin.comparisons.engines.settings import calibrated_values, settings_beside
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import Array
 

@@ -20,8 +20,8 @@ from dropspin.comparisons.engines.mapping import (
     refusal_of_rest_speed,
 )
 from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
-from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.packages import version
+from dropspin.comparisons.engines.settings import calibrated_values
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.model import initial_states

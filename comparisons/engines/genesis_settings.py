@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.engines.options import settings_beside
+from dropspin.comparisons.engines.settings import settings_beside
 
 FLIGHT, RIGID, SOL_PARAMS, SURFACE = settings_beside(__file__).values()
 SETTINGS = FLIGHT | RIGID | SOL_PARAMS | SURFACE

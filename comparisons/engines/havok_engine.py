@@ -9,9 +9,9 @@ import numpy as np
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.node_engine import NodeEngine
-from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import HAVOK
 from dropspin.comparisons.engines.rapier_scenes import refusal, surface_of
+from dropspin.comparisons.engines.settings import calibrated_values, settings_beside
 from dropspin.scenarios import Scenario
 
 SLOWEST, FASTEST = 1e-6, 100.0

@@ -6,8 +6,8 @@ import numpy as np
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.node_engine import NodeEngine
-from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import JOLT
+from dropspin.comparisons.engines.settings import calibrated_values, settings_beside
 from dropspin.scenarios import Scenario
 
 GRIPPING, SLOWEST = 1e6, 0.01

@@ -23,7 +23,7 @@ import numpy as np
 
 from dropspin.comparisons.engines.mapping import bodies_in, box_of, friction_of, principal_frame
 from dropspin.comparisons.engines.mujoco_settings import CONTACT
-from dropspin.comparisons.engines.options import calibrated_values
+from dropspin.comparisons.engines.settings import calibrated_values
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box, Capsule, Ellipsoid, Mesh, OnAxis, Sphere, Vertices
 from dropspin.scenarios.bodies.inertia import is_diagonal

@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from dropspin.comparisons.engines.options import settings_beside, spelled
+from dropspin.comparisons.engines.settings import settings_beside, spelled
 
 CONTACT, OPTION, FLAGS, BODY = settings_beside(__file__).values()
 """Of the pairs of the body with floor and walls, in the default profile of their geoms; of the tables option and flag; of the free joint.

@@ -14,8 +14,8 @@ import warp as wp
 from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, KnownLimitation, OneWorld, Simulation
 from dropspin.comparisons.engines.mapping import PROFILES, friction_of, refusal_of_rest_speed
 from dropspin.comparisons.engines.newton_settings import SETTINGS, SHAPE, STICKING, settings_of
-from dropspin.comparisons.engines.options import Setting, calibrated_values
 from dropspin.comparisons.engines.packages import version
+from dropspin.comparisons.engines.settings import Setting, calibrated_values
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box, Sphere
 from dropspin.scenarios.model import differ_in_start_alone, initial_states

@@ -3,7 +3,7 @@
 from functools import cache
 from itertools import chain
 
-from dropspin.comparisons.engines.options import Setting, settings_beside
+from dropspin.comparisons.engines.settings import Setting, settings_beside
 
 STICKING = 1e4
 SHAPE = {name: f"shape_material_{name}" for name in ("restitution", "mu", "mu_torsional", "mu_rolling", "ke", "kd", "kf", "ka")}

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation
 from dropspin.comparisons.engines.node_process import node
-from dropspin.comparisons.engines.options import Setting
+from dropspin.comparisons.engines.settings import Setting
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.errors import DropspinError

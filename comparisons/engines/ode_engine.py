@@ -13,8 +13,8 @@ import odepy as ode
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Engine, Simulation
-from dropspin.comparisons.engines.options import Setting, calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
+from dropspin.comparisons.engines.settings import Setting, calibrated_values, settings_beside
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.state import PARTS

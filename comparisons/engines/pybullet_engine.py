@@ -24,11 +24,11 @@ from dropspin.comparisons.engines.mapping import (
     refusal_of_hull,
     refusal_of_neighbour,
 )
-from dropspin.comparisons.engines.options import calibrated_values
 from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.engines.pybullet_limitations import LARGEST_TURN, MOST_BALLS, STRONGEST_FRICTION
 from dropspin.comparisons.engines.pybullet_settings import BODY, FLOOR, SETTINGS, WORLD
 from dropspin.comparisons.engines.pybullet_simulation import PyBulletSimulation
+from dropspin.comparisons.engines.settings import calibrated_values
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
 from dropspin.scenarios.bodies import SHAPES, Box, OnAxis, Vertices

@@ -5,7 +5,7 @@ The defaults were measured: each leaves the motions of a ball and a box as they 
 
 from typing import Any
 
-from dropspin.comparisons.engines.options import settings_beside
+from dropspin.comparisons.engines.settings import settings_beside
 
 WORLD, BODY = settings_beside(__file__).values()
 """Of setPhysicsEngineParameter, and of changeDynamics of the body."""

@@ -14,9 +14,9 @@ import rapier3d
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation
-from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.rapier_scenes import damping_of, refusal, surface_of
+from dropspin.comparisons.engines.settings import calibrated_values, settings_beside
 from dropspin.comparisons.measuring.predictions import spins_steadily
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere

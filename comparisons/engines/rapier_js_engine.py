@@ -10,9 +10,9 @@ import numpy as np
 
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.node_engine import NodeEngine
-from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import RAPIER_JS
 from dropspin.comparisons.engines.rapier_scenes import damping_of, refusal, surface_of
+from dropspin.comparisons.engines.settings import calibrated_values, settings_beside
 from dropspin.scenarios import Scenario
 
 PARAMETERS, BODY, SURFACE = settings_beside(__file__).values()

@@ -11,8 +11,8 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
 from dropspin.comparisons.engines.mapping import PROFILES, SEMI_IMPLICIT_EULER, built, friction_of, may_tumble, principal_frame
-from dropspin.comparisons.engines.options import calibrated_values, settings_beside
 from dropspin.comparisons.engines.packages import version
+from dropspin.comparisons.engines.settings import calibrated_values, settings_beside
 from dropspin.scenarios.bodies import Body, Sphere
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import Array

@@ -10,7 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from dropspin.comparisons.engines.adapter_code import adapter_code
 from dropspin.comparisons.engines.base import Engine, EngineBroken
-from dropspin.comparisons.engines.options import NumericOption, Setting
+from dropspin.comparisons.engines.options import NumericOption
+from dropspin.comparisons.engines.settings import Setting
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import validated

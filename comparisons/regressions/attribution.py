@@ -3,8 +3,9 @@
 from collections.abc import Collection, Mapping
 from typing import Any, Literal, NamedTuple
 
-from dropspin.comparisons.engines.options import engine_name, spelled
+from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.engines.registry import BUILT_IN
+from dropspin.comparisons.engines.settings import spelled
 from dropspin.comparisons.regressions.changes import Motion
 from dropspin.comparisons.results.provenance import MEASURING
 from dropspin.scenarios.text import printable

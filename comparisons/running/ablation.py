@@ -13,7 +13,7 @@ from functools import cache
 from itertools import combinations
 
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.engines.options import spelled
+from dropspin.comparisons.engines.settings import spelled
 from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import verify_accepted
 from dropspin.comparisons.running.verification import verified_settings

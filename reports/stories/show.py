@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dropspin.comparisons.engines.base import EngineBroken
-from dropspin.comparisons.engines.options import spelled
+from dropspin.comparisons.engines.settings import spelled
 from dropspin.comparisons.judging.expectations import verify_expectations
 from dropspin.reports.document import Rows
 from dropspin.reports.stories.numbers import bound

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from dropspin.comparisons.engines.options import Setting, Value, spelled
 from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.engines.settings import Setting, Value, spelled
 from dropspin.scenarios import Scenario
 
 

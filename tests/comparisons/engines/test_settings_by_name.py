@@ -8,8 +8,9 @@ import pytest
 from support.settings import verify_defaults_are_in_force, verify_settings_are_in_force
 
 from dropspin.comparisons.engines.mujoco_settings import SETTINGS, in_force
-from dropspin.comparisons.engines.options import Configured, Setting, spelled
+from dropspin.comparisons.engines.options import Configured
 from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.engines.settings import Setting, spelled
 from dropspin.comparisons.running.driving import simulate
 from dropspin.comparisons.running.verification import verify_build
 from dropspin.reports.stories.show import built_rows, setting_rows

@@ -11,13 +11,13 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.running.adapter_output import verified_settings
 from dropspin.comparisons.running.arguments import EngineEntry, verify_time_step
 from dropspin.comparisons.running.driving import Breakdown, verify_accepted
 from dropspin.comparisons.running.engine_entries import present_entry
 from dropspin.comparisons.running.process_limits import FIVE_MINUTES, ResourceLimits
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.start_phases import START_PHASES
-from dropspin.comparisons.running.verification import verified_settings
 from dropspin.scenarios import DropspinError, Scenario, load
 from dropspin.scenarios.state import Array
 

@@ -60,9 +60,9 @@ if TYPE_CHECKING:
     from dropspin.comparisons.results.results import Results as Results
     from dropspin.comparisons.results.store import load_results as load_results
     from dropspin.comparisons.results.table import Measurement as Measurement
+    from dropspin.comparisons.running.arguments import DEFAULT_DTS as DEFAULT_DTS
     from dropspin.comparisons.running.driving import simulate as simulate
     from dropspin.comparisons.running.process_limits import ResourceLimits as ResourceLimits
-    from dropspin.comparisons.running.run import DEFAULT_DTS as DEFAULT_DTS
     from dropspin.comparisons.running.run import measure as measure
     from dropspin.comparisons.running.run import run as run
     from dropspin.comparisons.sweeps.folder import read_sweep as read_sweep

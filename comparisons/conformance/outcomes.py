@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 from dropspin.comparisons.engines import exceptions
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.running.verification import BuildMismatch
+from dropspin.comparisons.running.adapter_output import BuildMismatch
 from dropspin.scenarios.text import rounded
 
 CheckOutcome = Literal["passed", "failed", "noted", "declined", "crashed", "timed_out"]

@@ -16,8 +16,7 @@ from dropspin.comparisons.conformance.motions import explain_start
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted, described
 from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, FLIGHTS, PROBES, accepted_scene, recorded, state_after
 from dropspin.comparisons.engines.base import Diverged, Engine, Simulation
-from dropspin.comparisons.running.arguments import EngineEntry
-from dropspin.comparisons.running.verification import (
+from dropspin.comparisons.running.adapter_output import (
     MULTIPLE,
     BuildMismatch,
     verified_claims,
@@ -29,6 +28,7 @@ from dropspin.comparisons.running.verification import (
     verify_build,
     verify_start,
 )
+from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.scenarios import Scenario, load, names
 from dropspin.scenarios.bodies.shape import times
 from dropspin.scenarios.state import Array

@@ -17,10 +17,10 @@ from dropspin.comparisons.conformance.protocol import ROUNDING, relative_differe
 from dropspin.comparisons.engines.base import BatchSimulation, Engine, numpy_array
 from dropspin.comparisons.faults.fault_model import changed_table
 from dropspin.comparisons.measuring.symmetries import SYMMETRIES
+from dropspin.comparisons.running.adapter_output import BuildMismatch, verified_batch, verify_starts
 from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import record
 from dropspin.comparisons.running.start_phases import START_PHASES
-from dropspin.comparisons.running.verification import BuildMismatch, verified_batch, verify_starts
 from dropspin.comparisons.symmetries.findings import STEP_MULTIPLE, Finding, judged
 from dropspin.comparisons.symmetries.study import batch_member, effects_of_rounding, findings_of
 from dropspin.scenarios import Scenario

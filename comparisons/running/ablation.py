@@ -14,9 +14,9 @@ from itertools import combinations
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.settings import spelled
+from dropspin.comparisons.running.adapter_output import verified_settings
 from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import verify_accepted
-from dropspin.comparisons.running.verification import verified_settings
 from dropspin.scenarios import DropspinError, Scenario
 
 Reverted = frozenset[str]

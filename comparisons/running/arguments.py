@@ -15,6 +15,8 @@ from dropspin.scenarios.text import counted
 
 SceneLike = Scenario | str | Path | Mapping[str, Any]
 """A scene, its catalogue name, the path of its file, or a mapping with the same keys as a file."""
+DEFAULT_DTS = (4e-3, 2e-3, 1e-3)
+"""Time steps of a run for which none are given [s]."""
 FEWEST_STEPS = 4
 MOST_STEPS = 2_000_000
 """Steps of a motion."""

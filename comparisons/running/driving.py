@@ -12,9 +12,7 @@ from dropspin.comparisons.engines.base import Diverged, Engine, KnownLimitation
 from dropspin.comparisons.engines.exceptions import described, short
 from dropspin.comparisons.engines.registry import engine as engine_named
 from dropspin.comparisons.judging.verdicts import Verdict
-from dropspin.comparisons.running.arguments import SceneLike, as_scene, ignore, verify_time_step
-from dropspin.comparisons.running.progress import OnSimulations
-from dropspin.comparisons.running.verification import (
+from dropspin.comparisons.running.adapter_output import (
     BuildMismatch,
     verified_batch,
     verified_lag,
@@ -26,6 +24,8 @@ from dropspin.comparisons.running.verification import (
     verify_build,
     verify_starts,
 )
+from dropspin.comparisons.running.arguments import SceneLike, as_scene, ignore, verify_time_step
+from dropspin.comparisons.running.progress import OnSimulations
 from dropspin.scenarios import DropspinError, Scenario, Trajectory
 
 

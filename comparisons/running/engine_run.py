@@ -8,13 +8,13 @@ from dropspin.comparisons.judging.convergence import Claim
 from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, EnsembleOutcome
+from dropspin.comparisons.running.adapter_output import verified_claims, verified_predictions
 from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, classify, record, record_batch, verify_accepted
 from dropspin.comparisons.running.engine_process import share_progress
 from dropspin.comparisons.running.ensembles import run_ensemble
 from dropspin.comparisons.running.progress import OnSimulations
 from dropspin.comparisons.running.uncertainty import simulations_of, uncertainties
-from dropspin.comparisons.running.verification import verified_claims, verified_predictions
 from dropspin.scenarios import Scenario, Trajectory, truth_for
 
 

@@ -13,7 +13,16 @@ from dropspin.comparisons.measuring.batch_quantities import compile_states
 from dropspin.comparisons.measuring.metrics import values_of
 from dropspin.comparisons.results.provenance import provenance
 from dropspin.comparisons.results.results import Results, joined
-from dropspin.comparisons.running.arguments import EngineEntry, SceneLike, as_scene, as_scenes, ignore, several, verify_time_step
+from dropspin.comparisons.running.arguments import (
+    DEFAULT_DTS,
+    EngineEntry,
+    SceneLike,
+    as_scene,
+    as_scenes,
+    ignore,
+    several,
+    verify_time_step,
+)
 from dropspin.comparisons.running.engine_entries import engine_entries
 from dropspin.comparisons.running.forecast import Forecast, forecast
 from dropspin.comparisons.running.foreign_motions import verify_motion
@@ -25,8 +34,6 @@ from dropspin.comparisons.running.scene_run import run_scene
 from dropspin.comparisons.running.start_phases import StartPhase
 from dropspin.comparisons.running.timing import time_engines
 from dropspin.scenarios import DropspinError, Trajectory, reference_for, truth_for
-
-DEFAULT_DTS = (4e-3, 2e-3, 1e-3)
 
 
 def run(

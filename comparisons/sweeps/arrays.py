@@ -19,8 +19,8 @@ from dropspin import reference_impl
 from dropspin.comparisons.engines.wang import Wang, reference_bodies, reference_world
 from dropspin.comparisons.measuring.batch_quantities import BATCH_BYTES, motions_side_by_side
 from dropspin.comparisons.measuring.motion_quantities import Setup
+from dropspin.comparisons.running.adapter_output import UNIT_TOLERANCE
 from dropspin.comparisons.running.arguments import FEWEST_STEPS, MOST_STEPS
-from dropspin.comparisons.running.verification import UNIT_TOLERANCE
 from dropspin.comparisons.sweeps.jobs import OPTION, Jobs, scene_of
 from dropspin.comparisons.sweeps.outcomes import Outcomes, not_run, requested_metrics, standard_metrics
 from dropspin.scenarios import Scenario, SceneError, Trajectory

@@ -10,9 +10,9 @@ from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS, energy_drift, energy_gain, penetration
 from dropspin.comparisons.measuring.motion_quantities import Motions
+from dropspin.comparisons.running.adapter_output import verified_refusal
 from dropspin.comparisons.running.arguments import verify_time_step
 from dropspin.comparisons.running.driving import Breakdown, Recording, divergence, record_batch, try_record
-from dropspin.comparisons.running.verification import verified_refusal
 from dropspin.comparisons.sweeps.jobs import Jobs, scene_of
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 from dropspin.scenarios.state import STATE_COLUMNS, Array

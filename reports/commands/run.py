@@ -145,7 +145,8 @@ def _run(
         test_symmetries: Whether to test symmetries too.
         options: The options `jobs`, `resources` and `quick` of `run`.
     """
-    from dropspin.comparisons.running.run import DEFAULT_DTS, run, what_changed
+    from dropspin.comparisons.running.arguments import DEFAULT_DTS
+    from dropspin.comparisons.running.run import run, what_changed
     from dropspin.comparisons.symmetries.findings import with_symmetries
     from dropspin.comparisons.symmetries.study import symmetries
     from dropspin.reports.run_folder import MeasuredScenes, fill, run_folder

@@ -96,7 +96,7 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
 
 def _built(entry: "EngineEntry", scene: Scenario, dt: float) -> Rows:
     """The model that an engine builds; runs in the engine's process."""
-    from dropspin.comparisons.running.verification import verified_refusal, verified_settings, verify_build
+    from dropspin.comparisons.running.adapter_output import verified_refusal, verified_settings, verify_build
 
     engine = entry.adapter
     refusal = verified_refusal(engine.refusal(scene))

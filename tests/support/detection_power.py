@@ -17,7 +17,8 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import Engine, Simulation
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.running.run import DEFAULT_DTS, run
+from dropspin.comparisons.running.arguments import DEFAULT_DTS
+from dropspin.comparisons.running.run import run
 from dropspin.scenarios import load
 from dropspin.scenarios.damping import Damping
 from dropspin.scenarios.model import Scenario

@@ -11,9 +11,9 @@ from support.engines import QUICK
 from dropspin import scenarios
 from dropspin.comparisons.engines import mujoco_engine
 from dropspin.comparisons.engines.registry import engine, engine_names
+from dropspin.comparisons.running.adapter_output import verify_build
 from dropspin.comparisons.running.driving import simulate
 from dropspin.comparisons.running.run import measure
-from dropspin.comparisons.running.verification import verify_build
 from dropspin.scenarios import DropspinError, UnknownName
 
 ENGINES = [

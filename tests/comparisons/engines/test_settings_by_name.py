@@ -11,8 +11,8 @@ from dropspin.comparisons.engines.mujoco_settings import SETTINGS, in_force
 from dropspin.comparisons.engines.options import Configured
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.engines.settings import Setting, spelled
+from dropspin.comparisons.running.adapter_output import verify_build
 from dropspin.comparisons.running.driving import simulate
-from dropspin.comparisons.running.verification import verify_build
 from dropspin.reports.stories.show import built_rows, setting_rows
 from dropspin.scenarios import DropspinError, load
 

@@ -13,7 +13,8 @@ from dropspin.comparisons.regressions.baseline import Baseline
 from dropspin.comparisons.regressions.causes import _caused, _explained, _with, causes
 from dropspin.comparisons.regressions.checking import accept, check
 from dropspin.comparisons.regressions.parameters import PARAMETERS
-from dropspin.comparisons.running.run import DEFAULT_DTS, run
+from dropspin.comparisons.running.arguments import DEFAULT_DTS
+from dropspin.comparisons.running.run import run
 from dropspin.reports.markdown import markdown
 from dropspin.reports.stories.check import document
 from dropspin.reports.stories.failures import failure_parts, failures

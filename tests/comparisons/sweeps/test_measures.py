@@ -17,8 +17,8 @@ from dropspin.comparisons.measuring.batch_quantities import motions_side_by_side
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.motion_quantities import Motions, Setup
+from dropspin.comparisons.running.adapter_output import UNIT_TOLERANCE
 from dropspin.comparisons.running.driving import record_batch
-from dropspin.comparisons.running.verification import UNIT_TOLERANCE
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, concatenated, not_run, run_scenes, standard_metrics
 from dropspin.comparisons.sweeps.parts import run_jobs
 from dropspin.comparisons.sweeps.spec import load_sweep

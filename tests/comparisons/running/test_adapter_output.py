@@ -5,7 +5,7 @@ import pytest
 from support import engines as made
 
 from dropspin.comparisons.engines.base import BatchSimulation
-from dropspin.comparisons.running.verification import (
+from dropspin.comparisons.running.adapter_output import (
     BuildMismatch,
     verified_batch,
     verified_record,

@@ -140,7 +140,7 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     is_wrong = depth_error > noteworthy or moving > noteworthy
     finest_depth, finest_speed, _ = _at_rest(body, dts[-1]) if is_wrong else (depth, speed, tips)
     floats = body.margin > 0.0 and -depth > noteworthy
-    of_depth = _of_error(body, depth_error, abs(finest_depth - body.rest_depth), noteworthy)
+    of_depth = _softened(body, depth, noteworthy) or _of_error(body, depth_error, abs(finest_depth - body.rest_depth), noteworthy)
     if math.isinf(body.rest_depth):
         endless = "and grows without end: a contact without stiffness holds no body"
         of_depth = (Finding("setting", body.in_file(*OF_CONTACT), detail=endless),)
@@ -151,6 +151,14 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         Answer("rest", "penetration", "m", measured=depth, in_force=body.rest_depth, physical=0.0, findings=of_depth),
         Answer("rest", "drift speed", "m/s", measured=speed, physical=0.0, detail=TIPS * tips, findings=of_speed),
     ]
+
+
+def _softened(body: LooseBody, depth: float, noteworthy: float) -> tuple[Finding, ...]:
+    """The finding of a depth that exceeds a limit [m] and that another friction cone at least halves; none otherwise."""
+    if "cone" not in body.causes.get("rest", ()) or not depth > noteworthy:
+        return ()
+    harder = body.tried(("cone",), body.dt)
+    return (Finding("setting", ("cone", "friction")),) if _at_rest(harder, body.dt)[0] < 0.5 * depth else ()
 
 
 def _of_error(body: LooseBody, error: float, finest: float, noteworthy: float) -> tuple[Finding, ...]:

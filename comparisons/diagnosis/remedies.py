@@ -154,7 +154,8 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
     if not found:
         return finding
     kind: Kind = "setting" if finding.kind == "model" and () not in found else finding.kind
-    settings = finding.settings if finding.shares else next(iter(found)) or ("timestep",)
+    unchanged = tuple(name for name in finding.settings if name not in (*body.remedies, "timestep"))
+    settings = finding.settings if finding.shares else (next(iter(found)) or ("timestep",)) + unchanged
     if finding.is_error:
         settings = tuple(name for name in finding.settings if name in changed)
     return finding._replace(kind=kind, settings=settings, remedies=tuple(found.values()))

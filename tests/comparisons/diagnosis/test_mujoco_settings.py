@@ -318,9 +318,22 @@ def test_pyramidal_cone_through_which_a_rough_body_falls_is_named_and_no_other_s
     box = FREE.format('<geom type="box" size=".05 .05 .05" friction="1000" solimp="0.998 0.998 0.001" solref="0.001 1"/>')
     body = body_of(tmp_path, box)
     found = [(answer.quantity, found) for question in (impact, rest) for answer, found in findings_of(body, question)]
-    assert {quantity: finding.settings for quantity, finding in found} == dict.fromkeys((REBOUND, "penetration", "drift speed"), ("cone",))
+    named = {REBOUND: ("cone",), "penetration": ("cone", "friction"), "drift speed": ("cone",)}
+    assert {quantity: finding.settings for quantity, finding in found} == named
     depths = [remedy.value for quantity, finding in found if quantity == "penetration" for remedy in finding.remedies]
     assert depths == pytest.approx([1.5e-5], rel=0.1)
+
+
+@pytest.mark.parametrize(("option", "depths"), [("", [0.01594]), ('impratio="500"', []), ('cone="elliptic"', [])])
+def test_depth_of_a_rough_body_at_rest_is_due_to_the_pyramidal_cone_and_the_friction(tmp_path, option, depths):
+    """MuJoCo's own box is 15.9 mm deep, as the exact solution has it, with a large impratio or elliptic cones less than a millimetre."""
+    box = FREE.format('<geom type="box" size=".1 .1 .1" friction="5"/>')
+    found = [(answer, finding) for answer, finding in findings_of(body_of(tmp_path, box, option), rest) if answer.quantity == "penetration"]
+    assert [answer.measured for answer, _ in found] == pytest.approx(depths, rel=1e-3)
+    assert [answer.in_force for answer, _ in found] == pytest.approx(depths, rel=1e-3)
+    for _, finding in found:
+        assert (finding.kind, finding.settings) == ("setting", ("cone", "friction"))
+        assert [remedy.value for remedy in finding.remedies] == pytest.approx([1.1e-4], rel=0.1)
 
 
 def test_wind_that_blows_a_box_away_is_named_and_removed(tmp_path):

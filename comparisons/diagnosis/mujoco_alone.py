@@ -49,7 +49,8 @@ class MuJoCoAlone:
         surface: The number of what it lands on; None for nothing.
         others: The numbers of what else it collides with and may land on, unless what it lands on was named.
         missed: A plane of the file that it falls through, and why; empty if there is none.
-        left_out: What else of the world it collides with, if no plane and no box; empty if there is nothing, or what it lands on was named.
+        left_out: What it collides with in place of the added plane; empty if there is nothing, or what it lands on was named.
+        between: What it collides with above what it lands on; empty if there is nothing, or what it lands on was named.
         pairs: The settings of the contacts with it, by geometry.
         dof: The number of the first degree of freedom of the free joint; None without one.
     """
@@ -67,6 +68,7 @@ class MuJoCoAlone:
         self.surface, self.others = next(iter(surfaces), None), surfaces[1:]
         self.missed = file.missed(self.geoms)
         self.left_out = file.left_out(self.geoms) if on is None else ""
+        self.between = file.between(self.geoms, self.surface) if on is None and self.surface is not None and not self.left_out else ""
         self.pairs: dict[int, dict[str, Any]] = {}
         if self.surface is not None and file.has_contacts:
             contacts = {geom: contact_of(old, geom, self.surface) for geom in self.geoms}

@@ -193,7 +193,7 @@ class MuJoCoBody(LooseBody):
         tilted = [f"a gravity {off:.3g}° from the inward normal of the surface"] * (off > LEVEL)
         names = ", ".join(alone.names[geom] for geom in self._touching)
         several = [f"a slide on geometries of different friction ({names})"] * (len(every) > 1)
-        self.unmodelled = [*file.unmodelled(alone.head), *start, *tilted, *several, *[alone.left_out] * bool(alone.left_out)]
+        self.unmodelled = [*file.unmodelled(alone.head), *start, *tilted, *several, *filter(None, (alone.left_out, alone.between))]
 
     def _parts(self) -> Iterator[Part]:
         """The geometries as shapes, relative to the centre of mass."""

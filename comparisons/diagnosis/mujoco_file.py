@@ -234,14 +234,35 @@ class MuJoCoFile:
         return f"{names[planes[0]]} does not hold it, because {why if own else without}"
 
     def left_out(self, own: Sequence[int]) -> str:
-        """The geometries of the world that some collide with and that are no planes and boxes, if none of these is below; else empty."""
+        """What some geometries collide with that they cannot land on, if no plane and no box of the world is below; else empty."""
+        flat, others = self._touchable(own)
+        return "" if any(math.isfinite(self.height_above(geom, own)) for geom in flat) else self._listed(others)
+
+    def between(self, own: Sequence[int], surface: int) -> str:
+        """The same above a plane or a box that they land on."""
+        level = self.height_above(surface, own)
+        return self._listed([geom for geom in self._touchable(own)[1] if self.height_above(geom, own) < level])
+
+    def _listed(self, geoms: Sequence[int]) -> str:
+        """The words for geometries, the first of them by name."""
         names = list(self.names(GEOM))
-        found = [geom for geom in self._still(own) if self.has_contacts and self._collide(own, geom)]
-        flat = [geom for geom in found if self.model.geom_type[geom] in SURFACES]
-        if any(math.isfinite(self.height_above(geom, own)) for geom in flat):
-            return ""
-        words = [f"the {kind_of(self.model, geom)} {names[geom]}" for geom in found if geom not in flat]
+        words = [f"the {kind_of(self.model, geom)} {names[geom]}" for geom in geoms]
         return f"{', '.join(words[:MOST_LISTED])}{' and others' * (len(words) > MOST_LISTED)}"
+
+    def _touchable(self, own: Sequence[int]) -> tuple[list[int], list[int]]:
+        """What some collide with: planes and boxes of the world; its other geometries, and those below of bodies that are not free."""
+        still, roots = self._still(own), self.model.body_rootid[self.model.geom_bodyid]
+        jointed = [geom for geom in self._jointed if roots[geom] not in roots[own] and math.isfinite(self.height_above(geom, own))]
+        found = [geom for geom in (*still, *jointed) if self.has_contacts and self._collide(own, geom)]
+        flat = [geom for geom in found if geom not in jointed and self.model.geom_type[geom] in SURFACES]
+        return flat, [geom for geom in found if geom not in flat]
+
+    @cached_property
+    def _jointed(self) -> list[int]:
+        """The geometries of bodies that move and are not free."""
+        heads = self.model.body_weldid[self.model.geom_bodyid].tolist()
+        moving = {head for head in heads if head and not self.is_free(head)}
+        return [geom for geom, head in enumerate(heads) if head in moving]
 
     def _still(self, own: Sequence[int]) -> list[int]:
         """The geometries of the world beside some and the plane that is added; the root of a URDF is no part of it."""

@@ -48,12 +48,13 @@ def quaternion(matrix: Array) -> Array:
 
 
 def distance_to(model: Any, data: Any, number: int, point: Array, direction: Array) -> float:
-    """The distance from a point to a plane or a box in a direction [m]; infinite if it is not there."""
+    """The distance from a point to a plane, or to the box around a geometry, in a direction [m]; infinite if it is not there."""
     turn = data.geom_xmat[number].reshape(3, 3)
     start, along = (point - data.geom_xpos[number]) @ turn, direction @ turn
     if model.geom_type[number] == mujoco.mjtGeom.mjGEOM_PLANE:
         return float(-start[2] / along[2]) if along[2] < -ALONG and start[2] >= 0.0 else np.inf
+    centre, half = model.geom_aabb[number, :3], model.geom_aabb[number, 3:]
     with np.errstate(divide="ignore", invalid="ignore"):
-        faces = (np.array([[-1.0], [1.0]]) * model.geom_size[number] - start) / along
+        faces = (centre + np.array([[-1.0], [1.0]]) * half - start) / along
     first, last = np.nanmax(faces.min(axis=0)), np.nanmin(faces.max(axis=0))
     return float(first) if 0.0 <= first <= last else np.inf

@@ -33,6 +33,7 @@ def test_target_that_nothing_is_measured_for_is_missed(tmp_path, geom, option, w
 GROUNDS = {
     "the cylinder table": '<geom name="table" type="cylinder" size="1 .1" friction=".2"/>',
     "the height field geom 0": '<geom type="hfield" hfield="h" friction=".2"/>',
+    "the box board": '<body><joint/><geom name="board" type="box" size="1 1 .1" friction=".2"/></body>',
     "the sphere a, the sphere b, the sphere c and others": "".join(f'<geom name="{name}" size=".1"/>' for name in "abcd"),
 }
 
@@ -52,9 +53,9 @@ def test_ground_that_is_neither_plane_nor_box_is_named_and_targets_are_not_judge
     assert not diagnose(tmp_path / "ground.xml").failed
 
 
-def test_plane_counts_and_not_what_else_of_the_world_a_body_collides_with(tmp_path):
+def test_plane_counts_and_what_else_of_the_world_a_body_collides_with_is_named(tmp_path):
     body = body_of(tmp_path, GROUNDS["the cylinder table"] + BALL.format(""))
-    assert (body.surface, body.unmodelled, body.left_out) == ("floor", [], "")
+    assert (body.surface, body.unmodelled, body.left_out) == ("floor", ["the cylinder table"], "")
     targets = list(Targets(None, 1.0).judged(body, [Answer("friction", COEFFICIENT, "1", measured=body.friction)]))
     assert [finding for answer in targets for finding in answer.findings] == []
 

@@ -12,6 +12,8 @@ FLOOR = '<geom name="floor" type="plane" size="0 0 1"/>'
 WALL = '<geom name="wall" type="plane" size="0 0 1" zaxis="1 0 0" pos="-2 0 0"/>'
 TABLE = '<geom name="table" type="box" size=".3 .3 .02" pos="{} .7"/>'
 TERRAIN = '<geom name="terrain" type="hfield" hfield="h"/><geom name="far" type="box" size=".1 5 1" pos="5 0 0"/>'
+POST = '<geom name="post" type="cylinder" size=".1 .25" pos="{} 0 .25"/>'
+SEESAW = '<body name="seesaw" pos="0 0 .3"><joint/><geom name="board" type="box" size="1 .1 .02"/></body>'
 BESIDE = ["a start beside or below the surface"]
 
 
@@ -37,6 +39,13 @@ def written(tmp_path, model):
         (FLOOR + '<geom name="table" type="box" size="1 .1 1" pos="0 -2 0"/>', 0.5, 'gravity="0 -9.81 0"', "table", []),
         (TERRAIN, 1.0, "", "a plane with default settings", ["the height field terrain"]),
         (WALL + TABLE.format("5 0"), 1.0, "", "table", BESIDE),
+        (FLOOR + POST.format(0), 1.0, "", "floor", ["the cylinder post"]),
+        (FLOOR + POST.format(1), 1.0, "", "floor", []),
+        (FLOOR + POST.format(0) + TABLE.format("0 0"), 1.0, "", "table", []),
+        (FLOOR + SEESAW, 1.0, "", "floor", ["the box board"]),
+        (FLOOR + SEESAW, 0.2, "", "floor", []),
+        (SEESAW, 1.0, "", "a plane with default settings", ["the box board"]),
+        (FLOOR + SEESAW.replace("<joint/>", "<freejoint/>"), 1.0, "", "floor", []),
         (TABLE.format("0 0"), 0.3, "", "table", BESIDE),
     ],
 )

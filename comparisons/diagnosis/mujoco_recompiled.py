@@ -21,6 +21,7 @@ NEUTRAL: Mapping[str, Any] = {
     "boundinertia": LEAST,
     "settotalmass": -1.0,
     "inertiafromgeom": mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO,
+    "inertiagrouprange": [0, mujoco.mjNGROUP - 1],
 }
 """Settings of the compiler that change masses and possible inertias of a file, with the values at which they change none."""
 CHANGED = 8

@@ -96,6 +96,15 @@ def test_mass_and_inertia_that_the_compiler_changes_are_said(tmp_path):
     assert impossible(body) == []
 
 
+def test_geometries_that_a_range_of_groups_leaves_out_of_the_mass_are_said(tmp_path):
+    range_of_groups = '<compiler inertiagrouprange="3 4"/>'
+    world = FREE.format(BOX.replace("/>", ' group="3"/>') + '<geom size=".05" mass="2"/>')
+    assert body_of(tmp_path, world).ignored == []
+    changed = {name: (setting.text, made) for name, setting, made in body_of(tmp_path, world, head=range_of_groups).ignored}
+    assert changed["mass"] == ('inertiagrouprange="3 4"', "changed: 1 kg")
+    assert changed["inertia"][0] == 'inertiagrouprange="3 4"'
+
+
 @pytest.mark.parametrize(
     ("settings", "changing"),
     [('inertiafromgeom="true"', "inertiafromgeom"), ('boundinertia=".02"', "boundinertia")],

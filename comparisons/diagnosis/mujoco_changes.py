@@ -16,7 +16,7 @@ from dropspin.comparisons.diagnosis.mujoco_file import BODY
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, with_exact_volumes, without, without_mass_of, without_visual
 from dropspin.comparisons.diagnosis.mujoco_shapes import mesh_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText, differ
-from dropspin.comparisons.diagnosis.urdf_file import used_by_neither_engine
+from dropspin.comparisons.diagnosis.urdf_file import used_by_neither_engine, without_collision
 from dropspin.comparisons.diagnosis.xml_file import Ignored, Setting
 
 IN_FORCE = {"lateral_friction": 1.0, "rolling_friction": 0.0, "spinning_friction": 0.0, "restitution": 0.0}
@@ -111,8 +111,11 @@ def _of_links(text: BodyText) -> Iterator[Ignored]:
             words = Setting(f"no inertial in link {name}", link.file, link.line)
             yield "inertial", words, f"missing: the mass is {mass:.4g} kg, that of the geometries at the default density"
         unread = [found for tag, value in IN_FORCE.items() for found in link.every(tag) if found.number("value", value) != value]
+        of_link = "" if number == text.head else f" of {name}"
         for found in (*unread, *used_by_neither_engine(link)):
-            yield found.tag + ("" if number == text.head else f" of {name}"), found.words, "not read"
+            yield found.tag + of_link, found.words, "not read"
+        for key, words, made in without_collision(link):
+            yield key + of_link, words, made
 
 
 def _visual(text: BodyText) -> Iterator[Ignored]:

@@ -10,7 +10,7 @@ import numpy as np
 from dropspin.comparisons.diagnosis.answers import digits
 from dropspin.comparisons.diagnosis.geometries import Part, mesh_shape, solid
 from dropspin.comparisons.diagnosis.pybullet_server import load, server
-from dropspin.comparisons.diagnosis.urdf_file import UrdfFile, used_by_neither_engine
+from dropspin.comparisons.diagnosis.urdf_file import UrdfFile, used_by_neither_engine, without_collision
 from dropspin.comparisons.diagnosis.xml_file import Element, Ignored, Setting
 from dropspin.comparisons.engines.pybullet_simulation import Z_TO_Y
 from dropspin.scenarios import DropspinError
@@ -138,8 +138,7 @@ class Link(NamedTuple):
         for collision in self.element.every("collision"):
             for element in collision.every("cylinder"):
                 yield "cylinder", element.words, f"replaced by the convex hull of 64 points, with a margin of {MARGIN:g} m"
-        if not self.geometry and next(self.element.every("visual"), None) is not None:
-            yield "collision", self.element.words, "missing: the link collides with nothing"
+        yield from without_collision(self.element)
 
 
 def read_links(file: UrdfFile, body: int) -> list[Link]:

@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from dropspin.comparisons.diagnosis.xml_file import Element, read_source
+from dropspin.comparisons.diagnosis.xml_file import Element, Ignored, read_source
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.text import printable
@@ -13,8 +13,9 @@ from dropspin.scenarios.text import printable
 FIXED = ("fixed", "floating")
 """Types of joints of which PyBullet makes fixed ones."""
 
-UNUSED = ("mu1", "mu2", "kp", "kd", "drake:mu_static", "drake:mu_dynamic", "contact_cfm", "contact_erp")
-"""Settings of contacts for Gazebo and Drake, and two that Bullet's loader reads and Bullet does not use."""
+OF_GAZEBO_AND_DRAKE = ("mu1", "mu2", "kp", "kd", "drake:mu_static", "drake:mu_dynamic")
+UNUSED = (*OF_GAZEBO_AND_DRAKE, "contact_cfm", "contact_erp", "contact_stiffness", "contact_damping")
+"""Settings of contacts for Gazebo and Drake, two that Bullet's loader reads and Bullet does not use, and two that it does not read."""
 
 PACKAGES = ("package://", "model://")
 """How ROS and Gazebo begin paths in folders that they look up."""
@@ -124,6 +125,12 @@ def used_by_neither_engine(link: Element) -> Iterator[Element]:
     for element in [] if robot is None else robot.children:
         if element.tag == "gazebo" and element.attributes.get("reference", name) == name:
             yield from element.every(*UNUSED)
+
+
+def without_collision(link: Element) -> Iterator[Ignored]:
+    """That a link has visual geometries alone."""
+    if next(link.every("collision"), None) is None and next(link.every("visual"), None) is not None:
+        yield "collision", link.words, "missing: the link collides with nothing"
 
 
 def _end(joint: Element, which: str) -> str:

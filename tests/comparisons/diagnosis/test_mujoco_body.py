@@ -285,7 +285,7 @@ def test_settings_of_contacts_that_neither_engine_reads_are_named(tmp_path):
     links = "".join(link.format(name, drake if name == "fixed" else "") for name in ("base", "fixed", "arm"))
     joint = '<joint name="{1}" type="{0}"><parent link="base"/><child link="{1}"/><axis xyz="0 0 1"/></joint>'
     joints = joint.format("fixed", "fixed") + joint.format("continuous", "arm")
-    gazebo = "<gazebo reference='{}'>\n<mu1>.2</mu1><contact_cfm/><material>Gazebo/Red</material></gazebo>"
+    gazebo = "<gazebo reference='{}'>\n<mu1>.2</mu1><contact_cfm/><contact_damping/><material>Gazebo/Red</material></gazebo>"
     text = f'<robot name="r">{links}{joints}{gazebo.format("base")}{gazebo.format("arm")}<gazebo><kp>1e6</kp></gazebo></robot>'
     of_mujoco = body_of(tmp_path, text, name="base", file="model.urdf").ignored
     of_pybullet = PyBulletModel(tmp_path / "model.urdf", "model.urdf").body("base", None).ignored
@@ -295,10 +295,23 @@ def test_settings_of_contacts_that_neither_engine_reads_are_named(tmp_path):
         assert found == [
             ("mu1", "<mu1>", 2),
             ("contact_cfm", "<contact_cfm>", 2),
+            ("contact_damping", "<contact_damping>", 2),
             ("kp", "<kp>", 3),
             drake_of_fixed,
             ("kp of fixed", "<kp>", 3),
         ]
+
+
+def test_link_without_a_geometry_that_collides_is_named(tmp_path):
+    pytest.importorskip("pybullet", exc_type=ImportError)
+    from dropspin.comparisons.diagnosis.pybullet_body import PyBulletModel
+
+    mass = '<inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    shape = '<visual><geometry><box size="1 1 1"/></geometry></visual>'
+    of_mujoco = body_of(tmp_path, f'<robot name="r"><link name="l">{mass}{shape}</link></robot>', file="model.urdf")
+    for body in (of_mujoco, PyBulletModel(tmp_path / "model.urdf", "model.urdf").body("l", None)):
+        found = {name: (setting.text, made) for name, setting, made in body.ignored}
+        assert (body.surface, found["collision"]) == ("", ('<link name="l">', "missing: the link collides with nothing"))
 
 
 def test_an_answer_has_a_finding_for_each_cause(tmp_path):

@@ -83,7 +83,7 @@ class LooseBody(ABC):
         friction_across: That along z; NaN if it is the same.
         restitution: The coefficient of restitution of both together; None if the engine has none.
         margin: Height above the surface from which the contact acts [m].
-        rolling: Whether friction resists rolling.
+        rolling: The names of the settings by which friction resists rolling.
         rest_depth: Depth of a body at rest below the surface by the contact settings [m], negative above; NaN if it has no closed form.
         written: The mass and inertia that the file has; None if it has no inertia.
         in_own_frame: The inertia that the file has about the axes of its own frame, shape (3, 3); None of several links.
@@ -119,7 +119,7 @@ class LooseBody(ABC):
     friction_across: float = math.nan
     restitution: float | None = None
     margin: float
-    rolling: bool
+    rolling: Sequence[str]
     rest_depth: float
     written: MassProperties | None
     in_own_frame: Array | None = None

@@ -193,8 +193,9 @@ class MuJoCoAlone:
         """
         pair = self.pairs[geom]
         changed = {name: np.array(str(self._changes[name]).split(), float) for name in ("solref", "solimp") if name in self._changes}
+        dimensions = {"condim": self._changes["condim"]} if "condim" in self._changes else {}
         still = {"margin": 0.0, "gap": 0.0} if "margin" in self._changes else {}
-        return pair | {"solref": self.clamped(pair)} | ({} if overrides(self.file.model) else changed | still)
+        return pair | {"solref": self.clamped(pair)} | ({} if overrides(self.file.model) else changed | still) | dimensions
 
     def clamped(self, pair: Mapping[str, Any]) -> Array:
         """The time constant and the damping ratio that are in force at the time step of the file, or of a remedy."""

@@ -54,6 +54,7 @@ REMEDIES: Mapping[str, Changes] = {
     "impratio": {"cone": "elliptic", "impratio": 10.0},
     "margin": {"margin": 0.0},
     "frictionloss": {"frictionloss": 0.0},
+    "condim": {"condim": 4},  # without rolling friction
     "density": NO_FLUID,
     "viscosity": NO_FLUID,
     "wind": {"wind": (0.0, 0.0, 0.0)},
@@ -182,7 +183,8 @@ class MuJoCoBody(LooseBody):
         frictions = (0.0, 0.0) if touching is None else next(iter(every)) if len(every) == 1 else (math.nan, math.nan)
         self.friction, self.friction_across = frictions[0], math.nan if frictions[0] == frictions[1] else frictions[1]
         self.margin, condim = (0.0, 0) if touching is None else (_margin(touching), int(touching["condim"]))
-        self.rolling = touching is not None and condim == 6 and bool(np.any(touching["friction"][3:]))
+        resists = touching is not None and condim == 6 and bool(np.any(touching["friction"][3:]))
+        self.rolling = (self.in_file("condim", "friction") or ("condim",)) if resists else ()
         self.rest_depth = self._rest_depth()
         raised = any(not np.array_equal(alone.clamped(pair), pair["solref"]) for pair in alone.pairs.values())
         self.ignored = list(ignored(self._text, self, raised=raised, condim=condim))

@@ -154,7 +154,7 @@ class BodyText:
             found += [joint.changed(of_joint) for joint in self._joint]
         if "gravcomp" in others:
             found += [body.changed({"gravcomp": others["gravcomp"]}) for body in self._bodies if "gravcomp" in body.attributes]
-        if contact := {name: value for name, value in others.items() if name in ("solref", "solimp", "margin")}:
+        if contact := {name: value for name, value in others.items() if name in ("solref", "solimp", "margin", "condim")}:
             found += self._with_contact(contact)
         return ", ".join(map(str, found)) or " ".join(f'{name}="{value}"' for name, value in others.items())
 
@@ -174,6 +174,7 @@ class BodyText:
         for number in alone:
             contact = self._contacts[number]
             kept = {"friction": contact["friction"][OF_GEOM], "condim": np.array([contact["condim"]])}
+            kept = {name: value for name, value in kept.items() if name not in changes}
             kept = {name: value for name, value in kept.items() if np.any(value != getattr(self.model, f"geom_{name}")[number])}
             texts = {name: " ".join(f"{one:g}" for one in value) for name, value in kept.items()}
             priority = 1 + self.model.geom_priority[[number, self._surface]].max()

@@ -48,13 +48,15 @@ CALLS = {
     "stiffness": "the file without <stiffness> and <damping>",
     "restitution": "changeDynamics(plane, -1, restitution={:g})",
     "own restitution": "changeDynamics(body, -1, restitution={:g})",
+    "rolling": "changeDynamics(body, -1, rollingFriction={:g})",
 }
 """What to call for changes of settings."""
-OF_EVERY_LINK = "for link in range(-1, getNumJoints(body)): changeDynamics(body, link, restitution={:g})"
+OF_LINKS = {"own restitution": "restitution", "rolling": "rollingFriction"}
+"""What PyBullet calls settings of each link."""
+OF_EVERY_LINK = "for link in range(-1, getNumJoints(body)): changeDynamics(body, link, {}={{:g}})"
 WRITTEN = (
     ("lateral_friction", "value", "friction"),
     ("restitution", "value", "restitution"),
-    ("rolling_friction", "value", "rolling"),
     ("inertia", "ixx", "inertia"),
     ("mass", "value", "mass"),
     ("collision", "group", "group"),
@@ -114,7 +116,7 @@ class PyBulletBody(LooseBody):
         of_spring = dict.fromkeys(("slide", "roll"), ("stiffness",))
         self.causes = of_spring if "stiffness" in self.settings else {"impact": ("contactERP",)}
         self.remedies = {"damping": {"damping": 0.0}, "inertia": {"inertia": "file"}, "contactERP": {"contactERP": 0.0}}
-        self.remedies["stiffness"] = {"stiffness": "none"}
+        self.remedies |= {"stiffness": {"stiffness": "none"}, "rolling": {"damping": 0.0, "rolling": 0.0}}
         if any(link.restitution > 0.0 for link in self._touching):
             self.remedies["restitution"] = {"restitution": 1.0}
 
@@ -122,7 +124,7 @@ class PyBulletBody(LooseBody):
         return PyBulletBody(self._model, self.name, {**self._changes, **changes})
 
     def patch(self, changes: Changes, dt: float) -> str:
-        texts = CALLS if len(self._links) == 1 else CALLS | {"own restitution": OF_EVERY_LINK}
+        texts = CALLS if len(self._links) == 1 else CALLS | {name: OF_EVERY_LINK.format(key) for name, key in OF_LINKS.items()}
         calls = [texts[name].format(value) for name, value in changes.items()]
         return ", ".join([*calls, *([f"setTimeStep({dt:g})"] if dt != STEP else [])])
 
@@ -165,9 +167,9 @@ class PyBulletBody(LooseBody):
             plane = bullet.loadURDF(PLANE, baseOrientation=Z_TO_Y.tolist()) if floor else -1
             if floor and "restitution" in changes:
                 bullet.changeDynamics(plane, -1, restitution=changes["restitution"])
-            if "own restitution" in changes:
-                for link in range(-1, bullet.getNumJoints(body)):
-                    bullet.changeDynamics(body, link, restitution=changes["own restitution"])
+            of_links = {key: changes[name] for name, key in OF_LINKS.items() if name in changes}
+            for link in range(-1, bullet.getNumJoints(body)) if of_links else ():
+                bullet.changeDynamics(body, link, **of_links)
             bullet.holds, bullet.numbers = (self, floor), (body, plane)
         return bullet.numbers
 
@@ -195,7 +197,7 @@ class PyBulletBody(LooseBody):
         self.friction = touching[0].dynamics[1] * plane[1] if len(frictions) == 1 else math.nan
         self.restitution = touching[0].restitution * plane[5] if is_hard and len(restitutions) == 1 else None
         self.margin = MARGIN if any(part.shape.shape == "mesh" for part in bottom) else 0.0
-        self.rolling = any(link.dynamics[6] > 0.0 for link in touching)
+        self.rolling = ("rolling",) * any(link.dynamics[6] > 0.0 for link in touching)
         self.rest_depth = SLOP - self.margin if is_hard else math.nan
         self.written = None if written is None or len(self._links) > 1 else MassProperties(mass, np.zeros(3), written)
         self.in_own_frame = None if self.written is None else self._links[0].in_own_frame
@@ -231,6 +233,8 @@ class PyBulletBody(LooseBody):
             written["centre"] = origin.words
             if (turn := origin.setting("rpy")) is not None:
                 written["turn"] = turn
+        for rolling in touching.element.every("rolling_friction"):
+            written["rolling"] = rolling.words
         return {name: Setting(text) for name, text in DEFAULTS.items()} | written
 
     def _ignored(self, restitution: float) -> Sequence[Ignored]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import KEPT, MOVES, TIPS, UNTURNED, WATCHED, Answer, judged
+from dropspin.comparisons.diagnosis.answers import KEPT, MOVES, NOTEWORTHY, TIPS, UNTURNED, WATCHED, Answer, Finding, judged
 from dropspin.comparisons.diagnosis.landing import is_at_rest, tilt
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.scenarios.rotations import about, conjugate, multiply, rotate, unrotate
@@ -146,6 +146,9 @@ def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         kept.append(last / first if rolls else 0.0)
         exact.append(float(spin_about_axis(1.0, first, heavy, 0.0, *drag)) / first if rolls else 0.0)
     is_off_joint = body.offset.any() and (body.armature or any(drag))  # which act at the body's origin
+    if body.rolling and abs(kept[0] - 1.0) > NOTEWORTHY:
+        acting = (*body.unknown, *["damping"] * any(body.falls), *body.rolling)
+        return [replace(answer, measured=kept[0], findings=(Finding("setting", acting),))]
     if body.rolling or not body.friction or body.falls.cubic or is_off_joint:
         return [replace(answer, measured=kept[0])]
     return [judged(body, answer, dts, kept, exact)]

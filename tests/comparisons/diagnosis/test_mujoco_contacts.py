@@ -1,5 +1,7 @@
 """Contacts of MJCF files in MuJoCo: targets, bodies that roll on soft surfaces or do not rest, and remedies that keep a target."""
 
+import math
+
 import numpy as np
 import pytest
 from support.model_files import FREE, body_of, findings_of, ladder
@@ -107,6 +109,25 @@ def test_ball_on_a_soft_surface_keeps_its_speed_when_it_rolls(tmp_path, geom):
     [answer] = roll(body, ladder(body))
     assert answer.measured == pytest.approx(1.0, abs=1e-3)
     assert answer.findings == ()
+
+
+@pytest.mark.parametrize(("floor", "place"), [("", 3), ('priority="2" condim="6" friction="1 .005 .01"', 2)])
+def test_rolling_friction_that_slows_a_ball_is_named_and_removed(tmp_path, floor, place):
+    """By µr g/(1.4 r), about 1.4 m/s²: MuJoCo's own ball stops within a second. Of contacts of four dimensions, it rolls on."""
+    ground = f'\n<geom name="ground" type="box" size="9 9 .1" {floor}/>\n'
+    geom = '<geom size=".05" mass="1" condim="6" friction="1 .005 .01"/>'
+    body = body_of(tmp_path, ground + FREE.format(geom), on="ground")
+    [(answer, finding)] = findings_of(body, roll)
+    assert answer.measured == pytest.approx(0.0, abs=1e-3)
+    assert math.isnan(answer.in_force)
+    assert finding.kind == "setting"
+    written = [str(body.settings[name]) for name in finding.settings]
+    assert written == [f"{text} (model.xml, line {place})" for text in ('condim="6"', 'friction="1 .005 .01"')]
+    [remedy] = finding.remedies
+    assert remedy.value == pytest.approx(1.0, abs=1e-3)
+    other = body_of(tmp_path, ground + FREE.format(remedy.text.rpartition(" (")[0]), on="ground")
+    assert other.rolling == ()
+    assert other.friction == 1.0
 
 
 def test_slides_of_a_body_that_does_not_rest_have_no_number(tmp_path):

@@ -11,7 +11,7 @@ from support.urdf_files import BOX, body, joint, link, two_links
 
 from dropspin.comparisons.diagnosis.landing import rest
 from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
-from dropspin.comparisons.diagnosis.sliding import slide
+from dropspin.comparisons.diagnosis.sliding import roll, slide
 
 STEP = 1.0 / 240.0
 
@@ -53,6 +53,21 @@ def test_slide_on_a_soft_contact_of_the_file_is_due_to_the_contact(tmp_path):
         assert [(one.text, one.value) for one in found.remedies] == [
             (box.patch({"stiffness": "none"}, STEP), pytest.approx(0.0201, rel=1e-2))
         ]
+
+
+def test_rolling_friction_that_slows_a_ball_is_named_and_removed(tmp_path):
+    """Beside damping; without both it rolls on."""
+    ball = body(tmp_path, link('<sphere radius=".1"/>', moments=(0.004,) * 3, extra='<contact><rolling_friction value="0.02"/></contact>'))
+    [answer] = answers_to(roll, ball)
+    [finding] = answer.findings
+    assert answer.measured < 0.3
+    assert (finding.kind, [str(ball.settings[name]) for name in finding.settings][-1]) == (
+        "setting",
+        '<rolling_friction value="0.02"> (model.urdf, line 1)',
+    )
+    [remedy] = finding.remedies
+    assert "changeDynamics(body, -1, rollingFriction=0)" in remedy.text
+    assert remedy.value == pytest.approx(1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize(

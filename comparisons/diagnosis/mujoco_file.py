@@ -115,17 +115,27 @@ class MuJoCoFile:
             DropspinError: No body is free.
         """
         verify_known("the model's body", wanted, self.heads)
-        heavy = [name for name, body in self.heads.items() if sum(self.model.body_mass[one] for one in self.group(body)) > 0.0]
+        heavy = self._heavy
         found = wanted or [name for name in heavy if loose or self.is_free(self.heads[name]) or (self.is_urdf and len(heavy) == 1)]
         if not found:
             if not heavy:
                 needed = "a link a mass above 0" if self.is_urdf else "a body a free joint and a mass"
                 raise DropspinError(f"{self.given}: no body both moves and has mass; give {needed}.")
-            are = "moves on joints, carries others on joints or is tied"
-            are = are if len(heavy) == 1 else "move on joints, carry others on joints or are tied"
-            there = f"{', '.join(heavy[:MOST_NAMES])}{' and others' * (len(heavy) > MOST_NAMES)} {are}"
-            raise DropspinError(f"{self.given}: no body is free: {there}; name one with --body, or give --loose for all.")
+            raise DropspinError(f"{self.given}: no body is free: {self.others([])}.")
         return list(found)
+
+    def others(self, chosen: Sequence[str]) -> str:
+        """The bodies with mass beside some that are chosen, why they are not free, and what to do; empty if there are none."""
+        names = [name for name in self._heavy if name not in chosen]
+        are = "moves on joints, carries others on joints or is tied"
+        are = are if len(names) == 1 else "move on joints, carry others on joints or are tied"
+        there = f"{', '.join(names[:MOST_NAMES])}{' and others' * (len(names) > MOST_NAMES)} {are}"
+        return f"{there}; name one with --body, or give --loose for all" if names else ""
+
+    @property
+    def _heavy(self) -> list[str]:
+        """The names of the bodies that move and have mass."""
+        return [name for name, body in self.heads.items() if self.model.body_mass[self.group(body)].sum() > 0.0]
 
     def runs(self, dt: float, changes: Changes) -> bool:
         """Whether the whole model runs for a tenth of a second with other options."""

@@ -94,10 +94,12 @@ class Diagnosis:
     Attributes:
         file: The file as the user gave it.
         bodies: The values and findings for each body and engine.
+        others: The bodies that are not diagnosed, and why; empty if there are none, or if bodies were chosen.
     """
 
     file: str
     bodies: tuple[BodyDiagnosis, ...]
+    others: str = ""
 
     @property
     def failed(self) -> bool:
@@ -175,6 +177,7 @@ def diagnose(
         entries = list(map(present_entry, chosen))
         with started_crews(1, 1, entries, resources) as crews:
             read = [(entry, crews[0].call(entry, _bodies, path, given, wanted, loose)) for entry in entries]
+            others = [crews[0].call(entry, _others, path, given, names) for entry, names in read if isinstance(names, list) and not wanted]
         pieces = [(entry, name) for entry, names in read if isinstance(names, list) for name in names]
         refusals = _refusals(given, read)
         with started_crews(jobs, len(pieces), entries, resources) as crews:
@@ -196,7 +199,7 @@ def diagnose(
             if all(body.declined for body in found):
                 whys = (why if (why := body.breakdown).endswith(".") else f"{given}: {body.name}: {why}." for body in found)
                 raise DropspinError(" ".join(dict.fromkeys(whys)))
-            return Diagnosis(given, tuple(found))
+            return Diagnosis(given, tuple(found), next((one for one in others if isinstance(one, str)), ""))
 
 
 def _refusals(given: str, read: Sequence[tuple[EngineEntry, list[str] | DropspinError | Breakdown]]) -> list[BodyDiagnosis]:
@@ -238,6 +241,11 @@ def _bodies(entry: EngineEntry, path: Path, given: str, wanted: Sequence[str], l
         return _file(entry.adapter.name, path, given).bodies(wanted, loose)
     except DropspinError as error:  # of a type that may need more than a text
         return DropspinError(str(error))
+
+
+def _others(entry: EngineEntry, path: Path, given: str, chosen: Sequence[str]) -> str:
+    """The bodies that are not diagnosed, and why; runs in the engine's process."""
+    return _file(entry.adapter.name, path, given).others(chosen)
 
 
 def _diagnosed(

@@ -69,6 +69,10 @@ class UrdfFile:
             raise DropspinError(f"{self.given}: no link that moves has mass, so that PyBullet holds them still.")
         return found
 
+    def others(self, chosen: Sequence[str]) -> str:
+        """The bodies with mass beside those that are free: none, because all links of a file are joined."""
+        return ""
+
     def joints(self, head: str) -> list[Element]:
         """The joints between a body and the links that are fixed to it."""
         return [self._parents[name] for name in self.heads[head] if name != head]

@@ -60,6 +60,8 @@ class Diagnosed(Study):
                 parts += [Heading(f"{both[0].name}: the engines differ"), Table(differences(both), on_terminal=is_alone)]
         if len(measured) > 1:
             parts.append(Sentences(of_several(bodies), on_page=False))
+        if self.diagnosis.others:
+            parts.append(Paragraph(f"Not diagnosed: {self.diagnosis.others}."))
         return Document(f"Diagnosis of {self.diagnosis.file}", parts, [Paragraph(summary(self.diagnosis))])
 
 

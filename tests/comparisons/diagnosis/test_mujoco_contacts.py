@@ -12,6 +12,8 @@ from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
 from dropspin.comparisons.diagnosis.sliding import creep, roll, slide
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis, Diagnosis, diagnose
+from dropspin.reports.document import Paragraph
+from dropspin.reports.stories.diagnose import Diagnosed
 from dropspin.scenarios import DropspinError
 
 BALL = FREE.format('<geom size=".05" mass="1" {}/>')
@@ -201,6 +203,17 @@ def test_body_without_a_result_is_not_a_sound_one():
     assert not Diagnosis("f", (sound, declined)).broke_down
     assert Diagnosis("f", (sound, declined._replace(declined=False))).broke_down
     assert Diagnosis("f", (sound, declined._replace(name="b"))).broke_down
+
+
+def test_bodies_beside_a_free_one_that_are_not_free_are_named(tmp_path):
+    arm = '<body name="arm"><joint type="hinge"/><geom size=".02"/></body>'
+    other = f'<body name="other" pos="1 0 1"><freejoint/><geom size=".1"/>{arm}</body>'
+    (tmp_path / "two.xml").write_text(f"<mujoco><worldbody>{BALL.format('')}{other}</worldbody></mujoco>")
+    of_all, of_one = diagnose(tmp_path / "two.xml"), diagnose(tmp_path / "two.xml", bodies="b")
+    assert [body.name for body in of_all.bodies] == ["b"]
+    named = "other, arm move on joints, carry others on joints or are tied; name one with --body, or give --loose for all"
+    assert (of_all.others, of_one.others) == (named, "")
+    assert Paragraph(f"Not diagnosed: {named}.") in Diagnosed(diagnosis=of_all).document().parts
 
 
 @pytest.mark.parametrize(("wanted", "step"), [(0.3, 2.5e-4), (0.5, 2e-3)])

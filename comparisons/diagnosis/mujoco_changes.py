@@ -11,6 +11,7 @@ from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, digits
 from dropspin.comparisons.diagnosis.geometries import is_whole
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.diagnosis.mjcf_defaults import option_setting
+from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
 from dropspin.comparisons.diagnosis.mujoco_elements import children_of
 from dropspin.comparisons.diagnosis.mujoco_file import BODY
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, with_exact_volumes, without, without_mass_of, without_visual
@@ -37,11 +38,8 @@ def ignored(text: BodyText, in_force: LooseBody, *, raised: bool, condim: int) -
         raised: Whether the time constant of a contact is raised.
         condim: The dimensions of the contact with what the body lands on; 0 without one.
     """
-    settings, written, gravity = text.settings, text.written, float(np.linalg.norm(text.file.gravity))
-    for unit, factor in PER_METRE.items():
-        if math.isclose(gravity, 9.81 * factor, rel_tol=NOTEWORTHY):
-            setting = option_setting(text.file.source, "option", "gravity", "")
-            yield "gravity", setting, f"taken as {gravity:g} m/s²; dropspin reads SI units, and this may be a model in {unit}"
+    settings, written = text.settings, text.written
+    yield from _options(text)
     if raised:
         constant = 2.0 * text.model.opt.timestep
         yield "solref", settings.get("solref", Setting("solref")), f"raised to a time constant of {constant:g} s, two time steps"
@@ -66,6 +64,20 @@ def ignored(text: BodyText, in_force: LooseBody, *, raised: bool, condim: int) -
         if text.model.body_weldid[text.head] == 0:
             yield "base", Setting("the root link") if element is None else element.words, "welded to the world"
         yield from _of_links(text)
+
+
+def _options(text: BodyText) -> Iterator[Ignored]:
+    """Options of the file that are in other units, or that a flag disables or would have to enable."""
+    source, gravity = text.file.source, float(np.linalg.norm(text.file.gravity))
+    for unit, factor in PER_METRE.items():
+        if math.isclose(gravity, 9.81 * factor, rel_tol=NOTEWORTHY):
+            setting = option_setting(source, "option", "gravity", "")
+            yield "gravity", setting, f"taken as {gravity:g} m/s²; dropspin reads SI units, and this may be a model in {unit}"
+    if np.any(text.model.opt.gravity) and not gravity:
+        yield "gravity", option_setting(source, "flag", "gravity", ""), "not used"
+    for name in () if overrides(text.model) else ("o_solref", "o_solimp", "o_friction", "o_margin"):
+        if (setting := option_setting(source, "option", name, "")).file:
+            yield name, setting, "not used: the flag override is not set"
 
 
 def _friction(text: BodyText, place: int) -> float:

@@ -115,10 +115,10 @@ class MuJoCoFile:
             DropspinError: No body is free.
         """
         verify_known("the model's body", wanted, self.heads)
-        heavy = self._heavy
-        found = wanted or [name for name in heavy if loose or self.is_free(self.heads[name]) or (self.is_urdf and len(heavy) == 1)]
+        is_whole = loose or (self.is_urdf and len(self._heavy) == 1)
+        found = wanted or [name for name in self._heavy if is_whole or self.is_free(self.heads[name])]
         if not found:
-            if not heavy:
+            if not self._heavy:
                 needed = "a link a mass above 0" if self.is_urdf else "a body a free joint and a mass"
                 raise DropspinError(f"{self.given}: no body both moves and has mass; give {needed}.")
             raise DropspinError(f"{self.given}: no body is free: {self.others([])}.")
@@ -127,12 +127,12 @@ class MuJoCoFile:
     def others(self, chosen: Sequence[str]) -> str:
         """The bodies with mass beside some that are chosen, why they are not free, and what to do; empty if there are none."""
         names = [name for name in self._heavy if name not in chosen]
-        are = "moves on joints, carries others on joints or is tied"
-        are = are if len(names) == 1 else "move on joints, carry others on joints or are tied"
+        verbs = ("moves", "carries", "is") if len(names) == 1 else ("move", "carry", "are")
+        are = "{} on joints, {} others on joints or {} tied".format(*verbs)
         there = f"{', '.join(names[:MOST_NAMES])}{' and others' * (len(names) > MOST_NAMES)} {are}"
         return f"{there}; name one with --body, or give --loose for all" if names else ""
 
-    @property
+    @cached_property
     def _heavy(self) -> list[str]:
         """The names of the bodies that move and have mass."""
         return [name for name, body in self.heads.items() if self.model.body_mass[self.group(body)].sum() > 0.0]
@@ -238,7 +238,9 @@ class MuJoCoFile:
         bodies, below = ({mujoco.mj_id2name(self.model, BODY, self.model.geom_bodyid[geom]) for geom in some} for some in (own, planes))
         pairs = [(one, {one.attributes.get("body1"), one.attributes.get("body2")}) for one in self.source.every("exclude")]
         excluded = [f"{one.words} leaves out their contacts" for one, pair in pairs if pair & bodies and pair & below]
-        why = "contacts are disabled" if not self.has_contacts else [*excluded, "no geometry of the body collides with it"][0]
+        flags = (option_setting(self.source, "flag", name, "enable") for name in ("contact", "constraint"))
+        disabled = [f"contacts are disabled, by {flag}" for flag in flags if '"disable"' in flag.text]
+        why = [*disabled, *excluded, "no geometry of the body collides with it"][0]
         discards = option_setting(self.source, "compiler", "discardvisual", "false")
         without = "the body has no geometry" + f", by {discards}" * ('"true"' in discards.text)
         return f"{names[planes[0]]} does not hold it, because {why if own else without}"
@@ -250,14 +252,13 @@ class MuJoCoFile:
 
     def between(self, own: Sequence[int], surface: int) -> str:
         """The same above a plane or a box that they land on."""
-        level = self.height_above(surface, own)
-        return self._listed([geom for geom in self._touchable(own)[1] if self.height_above(geom, own) < level])
+        return self._listed([geom for geom in self._touchable(own)[1] if self.height_above(geom, own) < self.height_above(surface, own)])
 
     def _listed(self, geoms: Sequence[int]) -> str:
         """The words for geometries, the first of them by name."""
         names = list(self.names(GEOM))
-        words = [f"the {kind_of(self.model, geom)} {names[geom]}" for geom in geoms]
-        return f"{', '.join(words[:MOST_LISTED])}{' and others' * (len(words) > MOST_LISTED)}"
+        words = [f"the {kind_of(self.model, geom)} {names[geom]}" for geom in geoms[:MOST_LISTED]]
+        return ", ".join(words) + " and others" * (len(geoms) > MOST_LISTED)
 
     def _touchable(self, own: Sequence[int]) -> tuple[list[int], list[int]]:
         """What some collide with: planes and boxes of the world; its other geometries, and those below of bodies that are not free."""

@@ -96,6 +96,20 @@ def test_mass_and_inertia_that_the_compiler_changes_are_said(tmp_path):
     assert impossible(body) == []
 
 
+@pytest.mark.parametrize(
+    ("flag", "named"),
+    [
+        ("", {"o_margin": "not used: the flag override is not set"}),
+        ('gravity="disable" override="enable"', {"gravity": "not used"}),
+        ('override="enable"', {}),
+    ],
+)
+def test_options_that_a_flag_disables_or_does_not_enable_are_said(tmp_path, flag, named):
+    body = body_of(tmp_path, FREE.format(BOX), 'o_margin="0.01"', f"<option><flag {flag}/></option>")
+    assert {name: made for name, _, made in body.ignored} == named
+    assert all(setting.line == 1 and setting.text.startswith(name) for name, setting, _ in body.ignored)
+
+
 def test_geometries_that_a_range_of_groups_leaves_out_of_the_mass_are_said(tmp_path):
     range_of_groups = '<compiler inertiagrouprange="3 4"/>'
     world = FREE.format(BOX.replace("/>", ' group="3"/>') + '<geom size=".05" mass="2"/>')
@@ -265,11 +279,12 @@ BARE = f'<inertial pos="0 0 0" mass="1" diaginertia="{numbers(MOMENTS)}"/>'
         (HIDDEN, "", "no geometry of the body collides with it"),
         (HIDDEN, EXCLUDED.replace('"world"', '"c"'), "no geometry of the body collides with it"),
         (BARE, "", "the body has no geometry"),
-        (BOX, '<option><flag contact="disable"/></option>', "contacts are disabled"),
+        (BOX, '<option><flag contact="disable"/></option>', 'contacts are disabled, by contact="disable" (model.xml, line 1)'),
+        (BOX, '<option><flag constraint="disable"/></option>', 'contacts are disabled, by constraint="disable" (model.xml, line 1)'),
         (BOX, EXCLUDED, f"{EXCLUDED.removeprefix('<contact>').split('/')[0]}> (model.xml, line 1) leaves out their contacts"),
         (BARE + HIDDEN, '<compiler discardvisual="true"/>', 'the body has no geometry, by discardvisual="true" (model.xml, line 1)'),
     ],
-    ids=["bits", "excluded from another", "bare", "disabled", "excluded", "discarded"],
+    ids=["bits", "excluded from another", "bare", "disabled", "unconstrained", "excluded", "discarded"],
 )
 def test_body_that_falls_through_the_floor(tmp_path, geom, option, why):
     other = '<body name="c" pos="3 0 1"><freejoint/><geom size=".1"/></body>'

@@ -15,7 +15,7 @@ from dropspin.comparisons.diagnosis.mjcf_defaults import option_setting
 from dropspin.comparisons.diagnosis.mujoco_compiled import placed
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of
 from dropspin.comparisons.diagnosis.mujoco_recompiled import LEAST
-from dropspin.comparisons.diagnosis.mujoco_shapes import ALONG, distance_to, kind_of
+from dropspin.comparisons.diagnosis.mujoco_shapes import ALONG, distance_to, listed
 from dropspin.comparisons.diagnosis.urdf_file import package_remedy, verify_one_root
 from dropspin.comparisons.diagnosis.xml_file import read_source
 from dropspin.comparisons.engines.mujoco_simulation import quiet
@@ -59,7 +59,7 @@ class MuJoCoFile:
     def __init__(self, path: Path, given: str) -> None:
         self.source, self.given = read_source(path), given
         self.is_urdf = self.source.tag == "robot"
-        self.refusal = ""
+        self.refusal, self._touched = "", dict[tuple[int, ...], tuple[list[int], list[int]]]()
         if self.is_urdf:
             verify_one_root(self.source, given)
         try:
@@ -255,18 +255,18 @@ class MuJoCoFile:
         return self._listed([geom for geom in self._touchable(own)[1] if self.height_above(geom, own) < self.height_above(surface, own)])
 
     def _listed(self, geoms: Sequence[int]) -> str:
-        """The words for geometries, the first of them by name."""
-        names = list(self.names(GEOM))
-        words = [f"the {kind_of(self.model, geom)} {names[geom]}" for geom in geoms[:MOST_LISTED]]
-        return ", ".join(words) + " and others" * (len(geoms) > MOST_LISTED)
+        return listed(self.model, list(self.names(GEOM)), geoms, MOST_LISTED)
 
     def _touchable(self, own: Sequence[int]) -> tuple[list[int], list[int]]:
         """What some collide with: planes and boxes of the world; its other geometries, and those below of bodies that are not free."""
+        if (known := self._touched.get(tuple(own))) is not None:
+            return known
         still, roots = self._still(own), self.model.body_rootid[self.model.geom_bodyid]
         jointed = [geom for geom in self._jointed if roots[geom] not in roots[own] and math.isfinite(self.height_above(geom, own))]
         found = [geom for geom in (*still, *jointed) if self.has_contacts and self._collide(own, geom)]
         flat = [geom for geom in found if geom not in jointed and self.model.geom_type[geom] in SURFACES]
-        return flat, [geom for geom in found if geom not in flat]
+        self._touched = {tuple(own): (flat, [geom for geom in found if geom not in flat])}  # of the last body alone
+        return self._touched[tuple(own)]
 
     @cached_property
     def _jointed(self) -> list[int]:

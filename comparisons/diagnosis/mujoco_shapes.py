@@ -1,5 +1,6 @@
 """The geometries of a compiled model of MuJoCo as shapes."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -20,6 +21,12 @@ STRAIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 def kind_of(model: Any, number: int) -> str:
     """The word for the kind of a geometry."""
     return mujoco.mjtGeom(int(model.geom_type[number])).name.removeprefix("mjGEOM_").lower().replace("hfield", "height field")
+
+
+def listed(model: Any, names: Sequence[str], geoms: Sequence[int], most: int) -> str:
+    """The words for geometries, by kind and name, up to a number of them."""
+    words = [f"the {kind_of(model, geom)} {names[geom]}" for geom in geoms[:most]]
+    return ", ".join(words) + " and others" * (len(geoms) > most)
 
 
 def shape_of(model: Any, number: int) -> tuple[Shape, Array]:

@@ -53,12 +53,13 @@ def ignored(text: BodyText, in_force: LooseBody, *, raised: bool, condim: int) -
             yield _changed(text, "inertia", f"{made}: moments {digits(has.tolist())} kg m²")
     yield from _meshes(text)
     yield from _visual(text)
-    unused = [name for name, (place, least, most) in FURTHER.items() if condim < least and _friction(text, place) > most]
     if condim == 1 and "friction" in settings:
         yield "friction", settings["friction"], "not used: condim is 1"
-    elif condim and unused:
-        needed = " and ".join(f"{name} friction needs condim {FURTHER[name][1]}" for name in unused)
-        yield "friction", settings["friction"], f"used in part: {needed}, and condim is {condim}"
+    for setting in text.frictions if condim > 1 else ():
+        if unused := [name for name, (place, least, most) in FURTHER.items() if condim < least and _friction(setting, place) > most]:
+            needed = " and ".join(f"{name} friction needs condim {FURTHER[name][1]}" for name in unused)
+            is_first = setting == settings.get("friction")
+            yield "friction" if is_first else f"friction in line {setting.line}", setting, f"used in part: {needed}, and condim is {condim}"
     if text.file.is_urdf:
         element = text.element
         if text.model.body_weldid[text.head] == 0:
@@ -80,10 +81,9 @@ def _options(text: BodyText) -> Iterator[Ignored]:
             yield name, setting, "not used: the flag override is not set"
 
 
-def _friction(text: BodyText, place: int) -> float:
+def _friction(written: Setting, place: int) -> float:
     """A coefficient of friction that the file has; 0 if it has none in this place."""
-    written = text.settings.get("friction")
-    numbers = written.text.partition('"')[2].strip('"').split() if written else []
+    numbers = written.text.partition('"')[2].strip('"').split()
     place += len(numbers) == 5  # the coefficients of a pair, two of them sliding
     return float(numbers[place]) if len(numbers) > place else 0.0
 

@@ -127,6 +127,17 @@ class BodyText:
         pairs = [self._pair(geom) for geom in self._touching]
         return list(filter(None, [*pairs, *(geom_element(self.file, geom) for geom in geoms)]))
 
+    @property
+    def frictions(self) -> list[Setting]:
+        """Where coefficients of friction are written of which a contact may have the largest: in pairs, or else in geometries."""
+        if "friction" in overrides(self.model):
+            return [self.settings["friction"]]
+        most = self.model.geom_priority[self._in_contact].max()
+        pairs = list(filter(None, map(self._pair, self._touching)))
+        geoms = [geom_element(self.file, geom) for geom in self._in_contact if self.model.geom_priority[geom] == most]
+        found = [mjcf_setting(element, "friction") for element in pairs or geoms if element]
+        return list(dict.fromkeys(filter(None, found)))
+
     def _pair(self, geom: int) -> Element | None:
         """The pair of the file that sets the contact of a geometry."""
         return None if self._surface is None else pair_element(self.file, geom, self._surface)

@@ -406,6 +406,24 @@ def test_friction_that_the_dimension_of_a_contact_leaves_out_is_named(tmp_path, 
     assert body_of(tmp_path, plain).ignored == []
 
 
+def test_friction_of_a_floor_that_the_dimension_of_a_contact_leaves_out_is_named(tmp_path):
+    """The larger coefficients count: of the floor those of turning and rolling, of which four dimensions have the first alone."""
+    floor, ball = 'friction="1 .5 .1"', '<geom size=".1" mass="1" condim="{}" friction="1 .02 .0001"/>'
+    world = f'\n<geom name="f" type="plane" size="1 1 .1" {floor}/>\n'
+    found = {
+        condim: [(name, setting.text, made.split(",")[0]) for name, setting, made in body.ignored]
+        for condim in (3, 4, 6)
+        for body in [body_of(tmp_path, world + FREE.format(ball.format(condim)), on="f")]
+    }
+    both = "used in part: torsional friction needs condim 4 and rolling friction needs condim 6"
+    assert found[3] == [
+        ("friction", 'friction="1 .02 .0001"', "used in part: torsional friction needs condim 4"),
+        ("friction in line 2", floor, both),
+    ]
+    assert found[4] == [("friction in line 2", floor, "used in part: rolling friction needs condim 6")]
+    assert found[6] == []
+
+
 @pytest.mark.parametrize(
     ("solref", "settings", "remedy"),
     [

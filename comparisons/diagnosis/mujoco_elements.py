@@ -1,6 +1,6 @@
 """The elements of an MJCF or URDF file that the bodies, geometries and contact pairs of the compiled model come from."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import mujoco
 
@@ -9,8 +9,8 @@ from dropspin.comparisons.diagnosis.xml_file import Element
 
 
 def body_element(file: MuJoCoFile, number: int) -> Element | None:
-    """A body in the file: by its name, or by its place if the file has as many bodies as the model."""
-    bodies = list(file.source.every("link" if file.is_urdf else "body"))
+    """A body in the file: by its name, or by its place if the file has as many bodies as the model, those of a replicate counted."""
+    bodies = list(_compiled(file.source, "link" if file.is_urdf else "body"))
     placed = bodies[number - 1] if len(bodies) == file.model.nbody - 1 else None
     return _named(bodies, mujoco.mj_id2name(file.model, BODY, number), placed)
 
@@ -18,12 +18,19 @@ def body_element(file: MuJoCoFile, number: int) -> Element | None:
 def geom_element(file: MuJoCoFile, number: int) -> Element | None:
     """A geometry in the file: by its name, or by its place if its body has as many geometries in the file as in the model."""
     every, body = list(file.source.every("geom")), int(file.model.geom_bodyid[number])
-    owner = body_element(file, body) if body else None
-    owners = [(geom, owner_of(geom)) for geom in every]
-    of_body = [geom for geom, one in owners if one is not None and (one is owner if body else one.tag == "worldbody")]
+    owners = [body_element(file, body)] if body else list(file.source.every("worldbody"))
+    of_body = [geom for owner in owners if owner is not None for geom in _compiled(owner, "geom") if owner_of(geom) is owner]
     place, added = number - int(file.model.body_geomadr[body]), body == 0  # the plane that is added to the world, its last geometry
     placed = of_body[place] if place < len(of_body) == file.model.body_geomnum[body] - added else None
     return _named(every, mujoco.mj_id2name(file.model, GEOM, number), placed)
+
+
+def _compiled(element: Element, tag: str) -> Iterator[Element]:
+    """The elements of a tag within one, as often as MuJoCo compiles them: those within a `replicate` several times."""
+    for child in element.children:
+        yield from [child] if child.tag == tag else []
+        for _ in range(int(child.attributes.get("count", 1)) if child.tag == "replicate" else 1):
+            yield from _compiled(child, tag)
 
 
 def _named(elements: Sequence[Element], name: str | None, placed: Element | None) -> Element | None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import MassProperties
@@ -12,12 +13,14 @@ from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
 from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
 from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, pair_element
+from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, without
 from dropspin.comparisons.diagnosis.xml_file import Element, Setting, tagged
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM, OPTION
 from dropspin.comparisons.engines.settings import spelled
 from dropspin.scenarios.bodies.inertia import OF_URDF, symmetric
 from dropspin.scenarios.state import Array
+from dropspin.scenarios.text import printable
 
 OF_MODEL = ("cone", "impratio", "density", "viscosity", "wind", "iterations", "ls_iterations", "tolerance")
 TURNS = ("quat", "axisangle", "xyaxes", "zaxis", "euler", "rpy")
@@ -172,16 +175,16 @@ class BodyText:
     def _freed(self, joint: Element) -> Setting:
         """A free joint in place of a joint, with what others may refer to it by."""
         kept = {name: value for name, value in joint.attributes.items() if name in ("name", "group")}
-        return Setting(f"{tagged('freejoint', kept)}/>", joint.file, joint.line)
+        return Setting(f"{tagged('freejoint', kept)}/>{joint.within}", joint.file, joint.line)
 
-    def _with_contact(self, changes: Mapping[str, object]) -> list[Setting]:
+    def _with_contact(self, changes: Mapping[str, object]) -> list[Setting | str]:
         """The pairs, and geometries without one, with other settings: margins add, of others those of the larger priority count alone."""
         pairs = {number: pair for number in self._contacts if (pair := self._pair(number)) is not None}
-        found = [pair.changed(changes) for pair in pairs.values()]
+        found: list[Setting | str] = [pair.changed(changes) for pair in pairs.values()]
         alone = [number for number in self._contacts if number not in pairs]
         if "margin" in changes:
             wide = [geom for geom in (*alone, self._surface) if alone and geom is not None and self.model.geom_margin[geom]]
-            return found + [geom.changed({"margin": 0}) for geom in filter(None, (geom_element(self.file, one) for one in wide))]
+            return found + [self._geom_changed(geom, {"margin": 0}) for geom in wide]
         for number in alone:
             contact = self._contacts[number]
             kept = {"friction": contact["friction"][OF_GEOM], "condim": np.array([contact["condim"]])}
@@ -189,9 +192,18 @@ class BodyText:
             kept = {name: value for name, value in kept.items() if np.any(value != getattr(self.model, f"geom_{name}")[number])}
             texts = {name: " ".join(f"{one:g}" for one in value) for name, value in kept.items()}
             priority = 1 + self.model.geom_priority[[number, self._surface]].max()
-            element = geom_element(self.file, number)
-            found += [] if element is None else [element.changed({**changes, "priority": priority, **texts})]
+            found.append(self._geom_changed(number, {**changes, "priority": priority, **texts}))
         return found
+
+    def _geom_changed(self, number: int, changes: Mapping[str, object]) -> Setting | str:
+        """A geometry with other settings; one that has no element in the file by its name or number, and that of its body."""
+        if (element := geom_element(self.file, number)) is not None:
+            return element.changed(changes)
+        body = int(self.model.geom_bodyid[number])
+        name = mujoco.mj_id2name(self.model, GEOM, number) or f"geometry {number - self.model.body_geomadr[body] + 1}"
+        of_body = mujoco.mj_id2name(self.model, BODY, body) or f"body {body}"
+        converted = " in an MJCF file (a URDF has no such settings)" if self.file.is_urdf else ""
+        return printable(f"{tagged('geom', changes)}/> for {name} of {of_body}") + converted
 
 
 def differ(wanted: Any, has: Any) -> bool:

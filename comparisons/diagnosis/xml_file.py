@@ -84,7 +84,13 @@ class Element:
 
     def changed(self, attributes: Mapping[str, object]) -> Setting:
         """The element with other attributes, to paste in its place."""
-        return Setting(f"{tagged(self.tag, {**self.attributes, **attributes})}{'>' if self.children else '/>'}", self.file, self.line)
+        text = tagged(self.tag, {**self.attributes, **attributes})
+        return Setting(f"{text}{'>' if self.children else '/>'}{self.within}", self.file, self.line)
+
+    @property
+    def within(self) -> str:
+        """The words that it is in a `replicate` of MJCF, whose copies all change with it; empty if it is in none."""
+        return " within <replicate>" if any(one.tag == "replicate" for one in self.around) else ""
 
 
 def tagged(tag: str, attributes: Mapping[str, object]) -> str:

@@ -12,6 +12,7 @@ from dropspin.comparisons.running.driving import Breakdown
 
 LID = '<geom name="lid" type="box" size=".1 .1 .01" pos="0 0 .05" mass=".1" friction="1.5"/>'
 SOLE = '<geom name="sole" type="box" size=".1 .1 .04" mass="1" {}/>'
+GROUND = '<geom name="ground" type="box" size="9 9 .1" {}/>'
 SPRING = {"solref": "0 -750", "solimp": "0.9999 0.9999 0.001 0.5 2"}
 
 
@@ -41,7 +42,7 @@ def test_geometries_of_different_friction_that_touch_together_have_none_in_commo
 )
 def test_remedy_of_a_contact_is_in_force_and_keeps_friction(tmp_path, floor, geom):
     """The remedy written into the file: what MuJoCo then mixes of both geometries."""
-    ground = f'<geom name="ground" type="box" size="9 9 .1" {floor}/>'
+    ground = GROUND.format(floor)
     body = body_of(tmp_path, ground + FREE.format(f'<geom name="g" type="box" size=".1 .1 .04" {geom}/>'), on="ground")
     patched = body.patch(SPRING, body.dt).rpartition(" (")[0]
     other = body_of(tmp_path, ground + FREE.format(patched), on="ground")
@@ -49,6 +50,29 @@ def test_remedy_of_a_contact_is_in_force_and_keeps_friction(tmp_path, floor, geo
     assert after["solref"] == pytest.approx([0, -750])
     assert after["friction"] == pytest.approx(before["friction"])
     assert after["condim"] == before["condim"]
+
+
+@pytest.mark.parametrize("name", ["n0", "n1"])
+def test_remedy_of_a_replicated_body_changes_the_element_within_the_replicate(tmp_path, name):
+    body = '<body name="n" pos="0 0 1"><freejoint/>{}</body>'
+    world = GROUND.format("") + f'<replicate count="2" offset="1 0 0">{body}</replicate>'
+    file = body_of(tmp_path, world.format('<geom type="box" size=".1 .1 .04"/>'), name=name, on="ground")
+    option, words = file.patch(SPRING, 0.00025).split("), ")
+    assert option == '<option timestep="0.00025"/> (model.xml, line 1'
+    assert words.endswith(" within <replicate> (model.xml, line 1)")
+    after = body_of(tmp_path, world.format(words.partition(" within")[0]), name=name, on="ground")
+    assert [list(contact["solref"]) for contact in after._touching.values()] == [[0, -750]]
+
+
+@pytest.mark.parametrize("dt", [0.002, 0.00025])
+def test_remedy_of_the_contact_of_a_link_is_written_out_for_mjcf(tmp_path, dt):
+    """A URDF has no settings of contacts that MuJoCo reads: the time step alone would not bounce."""
+    mass = '<inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    link = f'<link name="b">{mass}<collision><geometry><box size="1 1 1"/></geometry></collision></link>'
+    body = body_of(tmp_path, f'<robot name="r">{link}</robot>', file="model.urdf")
+    step = '<mujoco><option timestep="0.00025"/></mujoco>, ' * (dt < 0.002)
+    geom = '<geom solref="0 -750" solimp="0.9999 0.9999 0.001 0.5 2" priority="1"/>'
+    assert body.patch(SPRING, dt) == f"{step}{geom} for geometry 1 of b in an MJCF file (a URDF has no such settings)"
 
 
 def test_settings_and_remedies_of_a_pair_are_its_own(tmp_path):

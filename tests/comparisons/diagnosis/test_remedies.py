@@ -51,12 +51,23 @@ def test_settings_without_effect_are_not_named_as_causes():
     assert sentence.startswith("Slide, engine: stopping distance is 0.8 m instead of 1 m: not removed by a change of cone=")
 
 
-def test_setting_of_a_replicate_is_named_without_a_line(tmp_path):
+def test_setting_of_a_replicate_has_its_line(tmp_path):
     body = '<body name="b" pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .1" margin=".01"/></body>'
     body = body_of(tmp_path, f'<replicate count="2" offset="1 0 0">{body}</replicate>', name="b0")
     [(answer, finding)] = findings_of(body, rest)
     [sentence] = sentences(BodyDiagnosis("b0", "MuJoCo", answers=(replace(answer, findings=(finding,)),), settings=body.settings))
-    assert ": margin (compiled; its place in the file was not found). Remedy" in sentence
+    assert ': margin=".01" (model.xml, line 1). Remedy, tried: <geom type="box" size=".1 .1 .1" margin="0"/> within <replicate>' in sentence
+
+
+def test_setting_that_is_compiled_of_another_model_is_named_without_a_line(tmp_path):
+    part = '<mujoco><worldbody><body name="b"><freejoint/><geom type="box" size=".1 .1 .1" margin=".01"/></body></worldbody></mujoco>'
+    (tmp_path / "part.xml").write_text(part)
+    frame = '<frame pos="0 0 1"><attach model="part" body="b" prefix="p"/></frame>'
+    body = body_of(tmp_path, frame, head='<asset><model name="part" file="part.xml"/></asset>')
+    [(answer, finding)] = findings_of(body, rest)
+    [sentence] = sentences(BodyDiagnosis("pb", "MuJoCo", answers=(replace(answer, findings=(finding,)),), settings=body.settings))
+    assert ": margin (compiled; its place in the file was not found). Remedy, tried: <geom margin=" in sentence
+    assert "/> for geometry 1 of pb gives" in sentence
 
 
 @pytest.mark.parametrize(("left", "settings", "remedies"), [(0.04, ("cone",), 2), (0.09, ("timestep",), 1)])

@@ -1,5 +1,6 @@
 """Contacts of two geometries of a compiled model of MuJoCo, with the settings that MuJoCo mixes of both."""
 
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -42,6 +43,17 @@ def overrides(model: Any) -> dict[str, Any]:
 def _settings_of(model: Any, geom: int) -> GeomSettings:
     names = ("solref", "solimp", "friction", "condim", "margin", "priority", "solmix")
     return GeomSettings(**{name: plain(getattr(model, f"geom_{name}")[geom]) for name in names})
+
+
+def effect_of(model: Any, name: str, geom: int, other: int) -> tuple[float, float]:
+    """By how much a setting of a geometry changes its value in the contact with another one; how near to that it is, as a negative number.
+
+    The change is relative to MuJoCo's default. It is the same for two small coefficients of friction, of which the larger one counts.
+    """
+    own, beside = _settings_of(model, geom), _settings_of(model, other)
+    without = replace(own, **{name: getattr(GeomSettings(), name)})
+    written, has, default = (getattr(one, name) for one in (own, mixed(own, beside), mixed(without, beside)))
+    return float(np.abs(np.subtract(has, default)).max()), -float(np.abs(np.subtract(has, written)).max())
 
 
 def plain(value: Any) -> Any:

@@ -11,7 +11,7 @@ from dropspin.comparisons.diagnosis.loose_body import MassProperties
 from dropspin.comparisons.diagnosis.mjcf_defaults import mjcf_setting, option_setting
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
-from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
+from dropspin.comparisons.diagnosis.mujoco_contacts import effect_of, overrides
 from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, pair_element
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, without
@@ -97,11 +97,7 @@ class BodyText:
             return found
         places: dict[str, list[Element]] = {"gravcomp": self._bodies} | dict.fromkeys(OF_JOINT, self._joint)
         places |= dict.fromkeys(("contype", "conaffinity"), self._elements(self._in_contact))
-        places["margin"] = self._elements(sorted(self._in_contact, key=lambda geom: -self.model.geom_margin[geom]))
-        # Those of the largest priority alone count.
-        priorities = self.model.geom_priority[self._in_contact]
-        first = [geom for geom, priority in zip(self._in_contact, priorities, strict=True) if priority == priorities.max()]
-        places |= dict.fromkeys(("solref", "solimp", "friction", "condim"), self._elements(first))
+        places |= {name: self._elements(self._deciding(name)) for name in ("margin", "solref", "solimp", "friction", "condim")}
         inertial = next(iter(children_of(body, "inertial")), None)
         written = {name: [mjcf_setting(one, name) for one in elements] for name, elements in places.items()}
         if inertial is not None:
@@ -124,6 +120,16 @@ class BodyText:
         """The geometries that touch, or all if none does, and the one that the body lands on."""
         touching = list(self._touching) or [geom for geom, body in enumerate(self.model.geom_bodyid) if body in self.group]
         return touching if self._surface is None else [*touching, self._surface]
+
+    def _deciding(self, name: str) -> list[int]:
+        """The geometries whose setting changes the one in force, the largest change first; all of the largest priority if none does."""
+        touching, priorities = list(self._in_contact), self.model.geom_priority
+        if self._surface is None:
+            return touching
+        pairs = [pair for geom in touching if geom != self._surface for pair in ((geom, self._surface), (self._surface, geom))]
+        effects = {one: max(effect_of(self.model, name, *pair) for pair in pairs if pair[0] == one) for one in touching}
+        first = sorted(touching, key=effects.__getitem__, reverse=True)
+        return [geom for geom in first if effects[geom][0]] or [one for one in touching if priorities[one] == max(priorities[touching])]
 
     def _elements(self, geoms: Sequence[int]) -> list[Element]:
         """The elements that set a contact: the pairs, and those of geometries."""

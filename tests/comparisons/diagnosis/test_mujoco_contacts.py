@@ -73,6 +73,25 @@ def test_settings_of_a_contact_are_those_of_the_larger_priority(tmp_path):
     assert ignored["friction"][0] == 'friction=".3 .05 .01"'
 
 
+@pytest.mark.parametrize(
+    ("table", "cube", "name", "decides"),
+    [
+        ('solref=".2 1"', 'solref=".02 1"', "solref", 'solref=".2 1"'),  # the cube's is MuJoCo's default
+        ('solref=".001 1" solmix="100"', 'solref=".05 1"', "solref", 'solref=".001 1"'),
+        ('solref=".001 1"', 'solref=".05 1"', "solref", 'solref=".05 1"'),
+        ('solref="-900 -5"', 'solref=".5 1"', "solref", 'solref="-900 -5"'),
+        ('solimp=".5 .9 .001"', 'solimp=".9 .95 .001" priority="0"', "solimp", 'solimp=".5 .9 .001"'),
+        ('priority="1" solimp=".5 .9 .001"', 'solimp=".1 .2 .001"', "solimp", 'solimp=".5 .9 .001"'),
+        ('friction=".3"', 'friction=".2"', "friction", 'friction=".3"'),
+        ('friction="1.5"', 'friction=".2"', "friction", 'friction="1.5"'),
+        ('condim="6"', 'condim="4"', "condim", 'condim="6"'),
+    ],
+)
+def test_setting_of_two_geometries_is_that_which_decides_what_is_in_force(tmp_path, table, cube, name, decides):
+    world = f'<geom name="t" type="plane" size="1 1 .1" pos="0 0 .2" {table}/>' + FREE.format(f'<geom type="box" size=".1 .1 .1" {cube}/>')
+    assert body_of(tmp_path, world, on="t").settings[name].text == decides
+
+
 def test_friction_of_a_contact_without_friction_is_not_used(tmp_path):
     ball = FREE.format('<geom size=".1" mass="1" condim="1" priority="1" friction="0.9 .01 .001"/>')
     made = [made for name, _, made in body_of(tmp_path, ball).ignored if name == "friction"]

@@ -16,7 +16,7 @@ from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_changes import ignored
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
 from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of
-from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ELLIPTIC, ENUMERATIONS, OPTIONS, PLANE, MuJoCoFile
+from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ELLIPTIC, ENUMERATIONS, OF_ALL, PLANE, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.engines.base import Diverged
@@ -50,6 +50,7 @@ REMEDIES: Mapping[str, Changes] = {
     "armature": {"armature": 0.0},
     "gravcomp": {"gravcomp": 0.0},
     "integrator": {"integrator": "RK4"},
+    "eulerdamp": {"eulerdamp": "enable"},
     "cone": {"cone": "elliptic"},
     "impratio": {"cone": "elliptic", "impratio": 10.0},
     "margin": {"margin": 0.0},
@@ -118,14 +119,19 @@ class MuJoCoBody(LooseBody):
         ends = [name for name, is_early in ENDS.items() if is_early(getattr(option, name), OPTION[name].default)]
         of_contact = {"slide": (*ends, *contact), "roll": (*ends, *contact), "impact": (*ends, *softens), "rest": (*ends, *softens)}
         self.remedies = {**REMEDIES, **{name: {end: OPTION[end].default for end in ends} for name in ends}}
-        self.causes = {question: (*sleep, *acting, *of_contact.get(question, ())) for question, acting in CAUSES.items()}
+        is_explicit = alone.damping.any() and option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+        explicit = {"integrator": ("eulerdamp",) * bool(is_explicit and not option.integrator)}
+        self.causes = {
+            question: (*sleep, *(one for name in acting for one in (*explicit.get(name, ()), name)), *of_contact.get(question, ()))
+            for question, acting in CAUSES.items()
+        }
 
     def changed(self, changes: Changes) -> LooseBody:
         return MuJoCoBody(self.name, self._alone.changed(changes))
 
     def patch(self, changes: Changes, dt: float) -> str:
         texts = {name: spelled(value) for name, value in changes.items()}
-        options = {name: text for name, text in texts.items() if name in OPTIONS}
+        options = {name: text for name, text in texts.items() if name in OF_ALL}
         options |= {"timestep": f"{dt:g}"} if dt != self.dt else {}
         return self._text.patch(options, {name: text for name, text in texts.items() if name not in options})
 
@@ -145,7 +151,7 @@ class MuJoCoBody(LooseBody):
         return stored.tobytes(), self.pose.tobytes(), self.surface, *self.unmodelled, *words
 
     def elsewhere(self, dt: float, changes: Changes) -> tuple[int, bool]:
-        is_global = dt != self.dt or any(name in OPTIONS for name in changes)
+        is_global = dt != self.dt or not OF_ALL.isdisjoint(changes)
         others = [body for body in self._file.heads.values() if body != self._alone.head] if is_global else []
         return len(others), not is_global or self._file.runs(dt, changes)
 

@@ -34,6 +34,8 @@ ENUMERATIONS = {"RK4": int(mujoco.mjtIntegrator.mjINT_RK4), "elliptic": ELLIPTIC
 """Values of options in the words of MJCF."""
 UNMODELLED = {"nflex": "flexible bodies", "flg_surfacevel": "surface velocities", "flg_adhesion": "adhesion of geometries"}
 OPTIONS = [name for name in dir(mujoco.MjSpec().option) if not name.startswith("_")]
+OF_ALL = {*OPTIONS, "eulerdamp"}
+"""Changes that apply to all bodies: those of options, and the flag `eulerdamp`, which may be enabled."""
 MOST_NAMES, MOST_LISTED = 20, 3
 TURNED = 1e-6
 """Difference of |cos(angle / 2)| from 1 up to which two orientations are the same."""
@@ -292,6 +294,8 @@ def set_options(option: Any, compiled: Any, dt: float, changes: Changes) -> None
         setattr(option, name, ENUMERATIONS[value] if isinstance(value, str) else value)
     option.timestep = dt
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    if "eulerdamp" in changes:
+        option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
 
 
 def one_line(error: Exception) -> str:

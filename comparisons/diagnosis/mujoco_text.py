@@ -91,7 +91,8 @@ class BodyText:
         root, body = self.file.source, self.element
         options = {"timestep": "0.002", "integrator": "Euler"} | {name: spelled(OPTION[name].default) for name in OF_MODEL}
         found = {name: option_setting(root, "option", name, default) for name, default in options.items()}
-        found["sleep_tolerance"] = option_setting(root, "flag", "sleep", "disable")
+        found |= {"sleep_tolerance": option_setting(root, "flag", "sleep", "disable")}
+        found |= {"eulerdamp": option_setting(root, "flag", "eulerdamp", "enable")}
         of_all = {name: option_setting(root, "option", f"o_{name}", "") for name in overrides(self.model)}
         if body is None:
             return found
@@ -158,16 +159,7 @@ class BodyText:
             options: New values of options of the model.
             others: New values of other settings.
         """
-        found: list[Setting | str] = []
-        if options:
-            element = next(reversed(list(self.file.source.every("option"))), None)
-            within = next(self.file.source.every("mujoco"), None)
-            bare = f"{tagged('option', options)}/>"
-            if element is None and within is not None:
-                bare += f" within {within.words}"
-            elif self.file.is_urdf:
-                bare = f"<mujoco>{bare}</mujoco>"
-            found.append(element.changed(options) if element else bare)
+        found = self._with_options(options)
         if "damping" in others:
             found += [self._freed(joint) for joint in self._joint] or ["<freejoint/>"]
         elif of_joint := {name: value for name, value in others.items() if name in OF_JOINT}:
@@ -177,6 +169,22 @@ class BodyText:
         if contact := {name: value for name, value in others.items() if name in ("solref", "solimp", "margin", "condim")}:
             found += self._with_contact(contact)
         return ", ".join(map(str, found)) or " ".join(f'{name}="{value}"' for name, value in others.items())
+
+    def _with_options(self, options: Mapping[str, object]) -> list[Setting | str]:
+        """The elements with other options, and with another flag."""
+        flags = {name: value for name, value in options.items() if name == "eulerdamp"}
+        written = [element for element in self.file.source.every("flag") if flags.keys() <= element.attributes.keys()]
+        found: list[Setting | str] = [written[-1].changed(flags) if written else f"{tagged('flag', flags)}/>"] if flags else []
+        if not (options := {name: value for name, value in options.items() if name not in flags}):
+            return found
+        element = next(reversed(list(self.file.source.every("option"))), None)
+        within = next(self.file.source.every("mujoco"), None)
+        bare = f"{tagged('option', options)}/>"
+        if element is None and within is not None:
+            bare += f" within {within.words}"
+        elif self.file.is_urdf:
+            bare = f"<mujoco>{bare}</mujoco>"
+        return [element.changed(options) if element else bare, *found]
 
     def _freed(self, joint: Element) -> Setting:
         """A free joint in place of a joint, with what others may refer to it by."""

@@ -8,7 +8,7 @@ from functools import cache
 from itertools import combinations
 from typing import NamedTuple
 
-from dropspin.comparisons.diagnosis.answers import COEFFICIENT, NOTEWORTHY, REBOUND, Answer, Finding, Kind, Remedy
+from dropspin.comparisons.diagnosis.answers import COEFFICIENT, DECAY_TIME, NOTEWORTHY, REBOUND, Answer, Finding, Kind, Remedy
 from dropspin.comparisons.diagnosis.landing import rebound
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.engines.base import Diverged
@@ -145,6 +145,8 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
             # At rest, an error at one time step alone is not known to be one of the step.
             is_wrong = answer.question == "rest" and any(one.settings != ("margin",) for one in other.findings)
             remains = is_wrong or any(one.is_error == finding.is_error or body.unknown for one in other.findings)
+            if answer.quantity == DECAY_TIME and math.isnan(answer.measured):  # of a spin that did not decay
+                remains = math.isinf(other.measured)
             if (may_stay or not stays) and not remains:
                 found[settings] = Remedy(body.patch(changes, step), other.measured, other.unit, *body.elsewhere(step, changes))
                 changed = changed or {*changes, *["timestep"] * (step != body.dt)}

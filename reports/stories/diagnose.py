@@ -232,7 +232,8 @@ def _statement(pair: tuple[Answer, Finding]) -> str:
     if finding.kind == "changed":
         return f"is {finding.detail}"
     if finding.detail:
-        return f"is {measured}, {finding.detail}" if measured else f"of the simulation: {finding.detail}"
+        of_error = f" instead of {in_force}" if finding.is_error and in_force and math.isnan(answer.measured) else ""
+        return f"is {measured}{of_error}, {finding.detail}" if measured else f"of the simulation: {finding.detail}"
     wanted = in_force if finding.is_error and in_force else physical
     limit = f", {_value(answer.limit, answer.unit)} as dt → 0" if finding.kind == "time step" and math.isfinite(answer.limit) else ""
     shares = f" ({explained_by(dict(finding.shares), 'of the difference')})" if finding.shares else ""

@@ -1,12 +1,17 @@
 """Remedies and words of settings of MJCF and URDF files in MuJoCo, as they are to be pasted."""
 
+import math
+
 import pytest
 from support.model_files import FREE, body_of, findings_of
 
 from dropspin.comparisons.diagnosis.answers import TIPS, Answer, Finding
+from dropspin.comparisons.diagnosis.flight import spin
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.remedies import answers_to
 from dropspin.comparisons.diagnosis.sliding import roll, slide
+from dropspin.comparisons.diagnosis.study import BodyDiagnosis
+from dropspin.reports.stories.diagnose import sentences
 
 PADS = (("pad", 0.05, 0.004), ("rim", 0.049, 0.003))
 BOX = '<geom type="box" size=".1 .1 .1" mass="1" {}/>'
@@ -70,6 +75,25 @@ def test_remedy_of_a_margin_names_all_geometries_that_it_is_tried_on(tmp_path):
 def test_free_joint_keeps_its_name(tmp_path):
     body = body_of(tmp_path, f'<body name="b"><joint name="root" type="free" damping=".02"/>{BOX.format("")}</body>')
     assert body.patch(body.remedies["damping"], body.dt).startswith('<freejoint name="root"/>')
+
+
+@pytest.mark.parametrize(
+    ("damping", "why"), [(1.0, "changes its sign from step to step and diverges"), (0.5, "changes its sign from step to step")]
+)
+def test_spin_that_explicit_damping_reverses_has_no_decay(tmp_path, damping, why):
+    """Each step multiplies it by 1 - c dt/I, with 1 - 2.75 or 1 - 1.38; with `eulerdamp` by 1/(1 + c dt/I)."""
+    head, moment = '<option><flag eulerdamp="disable"/></option>', (0.2**2 + 0.06**2) / 12
+    world = f'<body name="b" pos="0 0 1"><joint type="free" damping="{damping}"/><geom type="box" size=".1 .1 .03" mass="1"/></body>'
+    body = body_of(tmp_path, world, 'timestep="0.01"', head=head)
+    answer = next(iter(answers_to(spin, body)))
+    [finding] = answer.findings
+    assert (answer.detail, finding.kind, finding.settings) == ("none", "time step", ("eulerdamp",))
+    assert finding.detail == f"because the spin {why}"
+    assert finding.remedies[0].text == '<flag eulerdamp="enable"/> (model.xml, line 1)'
+    assert finding.remedies[0].value == pytest.approx(0.01 / math.log1p(0.01 * damping / moment))
+    [sentence] = sentences(BodyDiagnosis("b", "MuJoCo", answers=(answer,), settings=body.settings))
+    exact = "3.633 ms" if damping == 1.0 else "7.267 ms"
+    assert sentence.startswith(f"Spin, time step: 1/e time about x is none instead of {exact}, because the spin {why}: eulerdamp=")
 
 
 def test_option_of_a_urdf_goes_into_its_element(tmp_path):

@@ -177,7 +177,8 @@ def test_damper_that_a_step_of_rk4_does_not_resolve_is_an_error_of_the_step(tmp_
     body = body_of(tmp_path, world, 'integrator="RK4"')
     about_x = next(iter(answers_to(spin, body)))
     assert 2.0 * body.dt / MOMENTS[0] > 2.785  # where RK4 is unstable
-    assert (about_x.measured, [found.kind for found in about_x.findings]) == (math.inf, ["time step"])
+    assert about_x.detail == "none"
+    assert [(found.kind, found.detail) for found in about_x.findings] == [("time step", "because the spin diverges")]
 
 
 @pytest.mark.parametrize(

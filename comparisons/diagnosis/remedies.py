@@ -164,8 +164,9 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
 
 
 def _tries(body: LooseBody, answer: Answer, finding: Finding) -> Iterator[tuple[tuple[str, ...], float]]:
-    """The settings whose effect to take away, one by one, then together, and the time step [s]."""
-    dt, known = body.dt, [name for name in finding.settings if name in body.remedies]
+    """The settings whose effect to take away, one by one, those of the file first, then together, and the time step [s]."""
+    dt, written = body.dt, {name for name, setting in body.settings.items() if setting.file}
+    known = sorted((name for name in finding.settings if name in body.remedies), key=lambda name: name not in written)
     for name in known:
         yield (name,), dt
         if finding.kind == "model":

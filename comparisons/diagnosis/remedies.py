@@ -21,6 +21,8 @@ MOST = 0.5
 """Share of an error that is left at most if what was changed is named as its cause."""
 SHORTEST = 0.01
 """The shortest time step that is tried, relative to that of the file: nobody would run a hundred times as many steps."""
+OF_RESTITUTION = (1.0, 1.0 / 8.0, 1.0 / 32.0)
+"""Time steps at which settings for a restitution are tried, relative to that of the file."""
 Question = Callable[[LooseBody, Sequence[float]], list[Answer]]
 """A function of a body and of time steps, of which the first is judged."""
 
@@ -59,16 +61,24 @@ class Targets(NamedTuple):
         return wanted is None or abs(answer.measured - wanted) <= NOTEWORTHY
 
     def _for_restitution(self, body: LooseBody, answers: Sequence[Answer]) -> dict[float, tuple[Remedy]]:
-        """By the speed of an impact, settings for the restitution: at the file's time step, if these meet the target at all speeds."""
-        found: dict[float, tuple[Remedy]] = {}
-        for step in (body.dt, _rounded(0.125 * body.dt)):
+        """By the speed of an impact, settings for the restitution, at the largest time step at which they meet the target at all speeds.
+
+        Empty if they do at none, the next one of which is tried if they come nearer to the target than before.
+        """
+        nearest = math.inf
+        for share in OF_RESTITUTION:
+            step = _rounded(share * body.dt)
             changes = body.for_restitution(self.wanted[REBOUND], step)
-            text, elsewhere, lively = body.patch(changes, step), body.elsewhere(step, changes), body.changed(changes)
+            lively = body.changed(changes)
             others = [rebound(lively, [step], answer.speed, REBOUND) for answer in answers if answer.quantity == REBOUND]
-            found = {other.speed: (Remedy(text, other.measured, other.unit, *elsewhere),) for other in others}
             if all(map(self.meets, others)):
+                text, elsewhere = body.patch(changes, step), body.elsewhere(step, changes)
+                return {other.speed: (Remedy(text, other.measured, other.unit, *elsewhere),) for other in others}
+            missed = max(abs(other.measured - self.wanted[REBOUND]) for other in others)
+            if not missed < nearest:
                 break
-        return found
+            nearest = missed
+        return {}
 
 
 def _why_unmeasured(body: LooseBody) -> str:

@@ -8,7 +8,7 @@ from support.model_files import FREE, body_of, findings_of, ladder
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, MOVES, REBOUND, TIPS, Answer
 from dropspin.comparisons.diagnosis.inertia import inertia
-from dropspin.comparisons.diagnosis.landing import impact, rest
+from dropspin.comparisons.diagnosis.landing import impact, rebound, rest
 from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
 from dropspin.comparisons.diagnosis.sliding import creep, roll, slide
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis, Diagnosis, diagnose
@@ -242,6 +242,13 @@ def test_one_change_is_given_for_a_restitution_at_all_speeds(tmp_path, wanted, s
     missed = [answer.findings[0].remedies for answer in Targets(wanted).judged(body, impact(body, ladder(body))) if answer.findings]
     assert {remedy.text for remedies in missed for remedy in remedies} == {body.patch(body.for_restitution(wanted, step), step)}
     assert [remedy.value for [remedy] in missed] == pytest.approx([wanted] * 3, abs=0.01)
+
+
+def test_settings_that_miss_the_wanted_restitution_are_no_remedy(tmp_path):
+    """The flag overrides what the geometry says."""
+    body = body_of(tmp_path, BALL.format(""), head='<option o_solref="0.2 1"><flag override="enable"/></option>')
+    [answer] = Targets(0.5).judged(body, [rebound(body, [body.dt], 1.0, REBOUND)])
+    assert [(finding.kind, finding.remedies) for finding in answer.findings] == [("target", ())]
 
 
 def test_tall_box_that_friction_turns_over_its_edge_has_no_stopping_distance(tmp_path):

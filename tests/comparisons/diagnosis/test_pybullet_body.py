@@ -15,7 +15,7 @@ from dropspin.comparisons.diagnosis.flight import fall, spin, tumble
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.pybullet_server import server
-from dropspin.comparisons.diagnosis.remedies import answers_to
+from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
 from dropspin.comparisons.diagnosis.sliding import creep, roll, slide
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import UnknownName
@@ -134,6 +134,14 @@ def test_remedies_are_tried(tmp_path, monkeypatch):
     [found] = of_impact.findings
     assert found.remedies[0].text == "setPhysicsEngineParameter(contactERP=0), setTimeStep(0.00052)"
     assert (found.kind, found.remedies[0].value) == ("setting", pytest.approx(0.5, rel=0.01))
+
+
+def test_remedy_of_a_restitution_meets_it_at_all_speeds(tmp_path):
+    """An eighth of the step gives 0.918 at 0.5 m/s."""
+    ball = body(tmp_path, link(BALL, extra='<contact><restitution value="0.9"/></contact>'))
+    missed = [finding for one in Targets(0.9).judged(ball, impact(ball, DTS[:1])) for finding in one.findings if finding.kind == "target"]
+    assert [remedy.value for finding in missed for remedy in finding.remedies] == pytest.approx([0.9] * 3, abs=0.01)
+    assert missed[0].remedies[0].text.endswith("setTimeStep(0.00013)")
 
 
 def test_rolling_and_sliding_slow_down_by_friction_and_damping(tmp_path):

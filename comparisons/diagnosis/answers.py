@@ -137,7 +137,8 @@ def judged(body: LooseBody, answer: Answer, dts: Sequence[float], values: Sequen
     errors, limit = [value - truth for value, truth in zip(values, exact, strict=True)], math.nan
     findings: list[Finding] = []
     if all(map(math.isfinite, values)) and is_sufficient(dts):
-        limit = error_budget(dts, errors, negligible=0.1 * NOTEWORTHY * scale).asymptotic_error if any(errors) else 0.0
+        budget = error_budget(dts, errors, negligible=0.1 * NOTEWORTHY * scale)
+        limit = math.nan if budget.cause == "unresolved" else budget.asymptotic_error
     if values[0] != free and ((not math.isfinite(free) and math.isfinite(exact[0])) or abs(exact[0] - free) > NOTEWORTHY * scale):
         findings.append(Finding("setting", acting))
     if abs(errors[0]) > NOTEWORTHY * scale * (1.0 + 1e-6):

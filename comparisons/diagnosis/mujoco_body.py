@@ -67,7 +67,7 @@ REMEDIES: Mapping[str, Changes] = {
 ROUGH = 2.0
 """Coefficient of friction from which pyramidal cones soften contacts: a box at rest is six times as deep as with 1, with 5 150 times."""
 CAUSES: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys(("fall", "spin", "tumble"), ("integrator",)),
+    **dict.fromkeys(("fall", "spin", "tumble"), ("eulerdamp", "integrator")),
     **dict.fromkeys(("impact", "rest", "roll"), ()),
     "slide": ("cone", "impratio"),
 }
@@ -119,12 +119,12 @@ class MuJoCoBody(LooseBody):
         ends = [name for name, is_early in ENDS.items() if is_early(getattr(option, name), OPTION[name].default)]
         of_contact = {"slide": (*ends, *contact), "roll": (*ends, *contact), "impact": (*ends, *softens), "rest": (*ends, *softens)}
         self.remedies = {**REMEDIES, **{name: {end: OPTION[end].default for end in ends} for name in ends}}
-        is_explicit = alone.damping.any() and option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP
-        explicit = {"integrator": ("eulerdamp",) * bool(is_explicit and not option.integrator)}
-        self.causes = {
-            question: (*sleep, *(one for name in acting for one in (*explicit.get(name, ()), name)), *of_contact.get(question, ()))
-            for question, acting in CAUSES.items()
-        }
+        is_explicit = alone.damping.any() and option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP and not option.integrator
+        idle = {name for name, acts in (("cone", option.cone != ELLIPTIC), ("eulerdamp", is_explicit)) if not acts}
+        if "cone" in idle:
+            self.remedies = self.remedies | {"impratio": {"impratio": REMEDIES["impratio"]["impratio"]}}
+        of_option = {question: tuple(name for name in names if name not in idle) for question, names in CAUSES.items()}
+        self.causes = {question: (*sleep, *acting, *of_contact.get(question, ())) for question, acting in of_option.items()}
 
     def changed(self, changes: Changes) -> LooseBody:
         return MuJoCoBody(self.name, self._alone.changed(changes))

@@ -33,6 +33,11 @@ def test_setting_of_the_file_is_named_before_a_default_that_removes_the_error_to
     assert [remedy.value for remedy in found[0].remedies] == pytest.approx([0.01263, 0.01177], rel=0.01)
 
 
+def test_elliptic_cone_of_the_file_is_not_named_beside_its_impratio(tmp_path):
+    body = body_of(tmp_path, FREE.format('<geom type="box" size=".1 .1 .03" mass="1"/>'), 'impratio="0.01" cone="elliptic"')
+    assert [finding.settings for _, finding in findings_of(body, slide)] == [("impratio",)] * 2
+
+
 def test_limit_that_the_time_steps_do_not_determine_is_not_stated(tmp_path):
     """MuJoCo's own slides at 20, 10 and 5 ms are 9.0, 13.0 and 14.3 mm, and at finer steps shorter: 13.3 mm at 0.1 ms."""
     body = body_of(tmp_path, FREE.format('<geom type="box" size=".1 .06 .03" mass="1"/>'), 'timestep="0.02"')

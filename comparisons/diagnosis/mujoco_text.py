@@ -98,7 +98,7 @@ class BodyText:
             return found
         places: dict[str, list[Element]] = {"gravcomp": self._bodies} | dict.fromkeys(OF_JOINT, self._joint)
         places |= dict.fromkeys(("contype", "conaffinity"), self._elements(self._in_contact))
-        places |= {name: self._elements(self._deciding(name)) for name in ("margin", "solref", "solimp", "friction", "condim")}
+        places |= {name: self._elements(self._deciding(name)) for name in ("solref", "solimp", "friction", "condim")}
         inertial = next(iter(children_of(body, "inertial")), None)
         written = {name: [mjcf_setting(one, name) for one in elements] for name, elements in places.items()}
         if inertial is not None:
@@ -108,8 +108,21 @@ class BodyText:
             written["centre"] = [inertial.setting("pos") or next((one.words for one in inertial.every("origin")), inertial.words)]
             written["turn"] = [one.setting(name) for one in (inertial, *inertial.every("origin")) for name in TURNS]
             written["inertia"] = [inertial.setting(name) for name in names] if tensor is None else [tensor.words]
+        written["margin"] = [self._margin]
         # Of several places, the first one counts.
         return found | {name: one for name, several in written.items() for one in reversed(several) if one} | of_all
+
+    @property
+    def _margin(self) -> Setting | None:
+        """The margins of the body and of the surface, which add, in the order of their sizes; or that of a pair."""
+        deciding = self._deciding("margin")
+        one_each = {geom == self._surface: geom for geom in reversed(deciding)}.values()
+        elements = self._elements([geom for geom in deciding if geom in one_each])
+        found = {one: element.tag == "pair" for element in elements if (one := mjcf_setting(element, "margin"))}
+        if not found:
+            return None
+        *others, last = list(found)[: 1 if any(found.values()) else None]
+        return last._replace(text=", ".join([*map(str, others), last.text]))
 
     @cached_property
     def _joint(self) -> list[Element]:

@@ -103,6 +103,12 @@ def test_settings_of_all_sections_of_defaults_are_found(tmp_path):
     assert {name: settings[name].text for name in ("margin", "solimp")} == {"margin": 'margin=".001"', "solimp": 'solimp=".8 .9 .001"'}
 
 
+def test_margins_that_add_are_both_named(tmp_path):
+    feet = "".join(f'<geom name="f{y}" size=".05" pos="0 {y} 0" margin=".002"/>' for y in (-1, 1))
+    settings = body_of(tmp_path, GROUND.format('margin=".003"') + "\n" + FREE.format(feet), on="ground").settings
+    assert str(settings["margin"]) == 'margin=".003" (model.xml, line 1), margin=".002" (model.xml, line 2)'
+
+
 def test_gravcomp_of_a_welded_part_lifts_its_own_weight(tmp_path):
     part = '<body name="w" gravcomp="1"><geom type="box" size=".1 .1 .02" mass="1" pos="0 0 .06"/></body>'
     body = body_of(tmp_path, FREE.format(f'<geom type="box" size=".1 .1 .04" mass="1"/>{part}'))

@@ -61,9 +61,12 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
 
 def _of_short_slide(answer: Answer) -> Answer:
     """An answer without the finding of an error that is small for a short slide."""
-    is_known = not math.isnan(answer.in_force)
     is_small = abs(answer.measured - answer.exact) <= SHORT * answer.exact
-    return replace(answer, findings=tuple(found for found in answer.findings if not is_small or (is_known and not found.is_error)))
+    change, deviation = answer.in_force - answer.physical, answer.measured - answer.physical
+    # Of a setting whose small effect such errors hide or exceed, the deviation says nothing.
+    shows = math.copysign(deviation, deviation * change) > NOTEWORTHY * answer.physical
+    is_kept = [not is_small if found.is_error or math.isnan(change) else shows for found in answer.findings]
+    return replace(answer, findings=tuple(found for found, kept in zip(answer.findings, is_kept, strict=True) if kept))
 
 
 def _stops(body: LooseBody, dts: Sequence[float], rests: Sequence[Array], direction: Array, friction: float) -> list[float]:

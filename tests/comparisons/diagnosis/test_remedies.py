@@ -120,6 +120,12 @@ def test_short_slide_has_its_tolerance_where_no_exact_solution_is_known(measured
     assert len(_of_short_slide(answer).findings) == count
 
 
+@pytest.mark.parametrize(("measured", "count"), [(0.998, 0), (0.97, 1), (1.4, 0)])
+def test_setting_that_changes_a_short_slide_is_named_where_the_slide_shows_it(measured, count):
+    answer = Answer("slide", "", "m", measured=measured, in_force=0.98, physical=1.0, findings=(Finding("setting", ("damping",)),))
+    assert len(_of_short_slide(answer).findings) == count
+
+
 def test_ball_beside_the_origin_of_its_body_rolls(tmp_path):
     """About its centre of mass, it is the same ball."""
     kept = []

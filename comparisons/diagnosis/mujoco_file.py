@@ -43,6 +43,8 @@ LONGEST_STEP = 0.1
 """The longest time step [s] in which the motions, of a second or less, are resolved."""
 OF_CONTACT = ("contype", "conaffinity", "condim", "priority", "friction", "solmix", "solref", "solimp", "margin", "gap")
 """The settings of a geometry's contacts."""
+OF_MESH = "in an MJCF file with this mesh"
+"""Where to write settings for a mesh."""
 ADDED = "a plane with default settings"
 """The surface of a file that has none."""
 
@@ -60,6 +62,9 @@ class MuJoCoFile:
 
     def __init__(self, path: Path, given: str) -> None:
         self.source, self.given = read_source(path), given
+        if path.suffix != Path(given).suffix:  # a mesh, of which dropspin wrote a model
+            for element in self.source.every("mesh", "body", "freejoint", "geom"):
+                element.file, element.line = OF_MESH, 0
         self.is_urdf = self.source.tag == "robot"
         self.refusal, self._touched = "", dict[tuple[int, ...], tuple[list[int], list[int]]]()
         if self.is_urdf:

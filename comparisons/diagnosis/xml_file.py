@@ -20,7 +20,7 @@ class Setting(NamedTuple):
     Attributes:
         text: The attribute and its value, such as `damping="0.01"`.
         file: The file that has it; empty if no file does, and the value is the engine's default.
-        line: Its line.
+        line: Its line; 0 if the user has no such file.
     """
 
     text: str
@@ -28,7 +28,8 @@ class Setting(NamedTuple):
     line: int = 0
 
     def __str__(self) -> str:
-        return f"{self.text} ({self.file}, line {self.line})" if self.file else f"{self.text} (the engine's default)"
+        place = f"{self.file}, line {self.line}" if self.line else self.file
+        return f"{self.text} ({place})" if self.file else f"{self.text} (the engine's default)"
 
 
 Ignored = tuple[str, Setting, str]

@@ -8,6 +8,7 @@ from support.model_files import FREE, body_of, findings_of
 from dropspin.comparisons.diagnosis.answers import TIPS, Answer, Finding
 from dropspin.comparisons.diagnosis.flight import spin
 from dropspin.comparisons.diagnosis.landing import impact, rest
+from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
 from dropspin.comparisons.diagnosis.remedies import answers_to
 from dropspin.comparisons.diagnosis.sliding import roll, slide
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis
@@ -125,6 +126,12 @@ def test_option_of_a_urdf_goes_into_its_element(tmp_path):
     assert body.patch({"cone": "elliptic"}, body.dt) == '<option cone="elliptic"/> within <mujoco> (model.urdf, line 1)'
     bare = body_of(tmp_path, f'<robot name="r">{link}</robot>', file="model.urdf")
     assert bare.patch({"cone": "elliptic"}, bare.dt) == '<mujoco><option cone="elliptic"/></mujoco>'
+
+
+def test_remedy_of_a_mesh_does_not_point_to_the_file_that_dropspin_wrote(tmp_path):
+    body_of(tmp_path, FREE.format(BOX.format("")))
+    body = MuJoCoModel(tmp_path / "model.xml", "cup.obj").body("b", None)
+    assert body.patch({"solref": "0 -750"}, body.dt).endswith(' solref="0 -750" priority="1"/> (in an MJCF file with this mesh)')
 
 
 def test_second_number_of_five_frictions_is_sliding(tmp_path):

@@ -16,7 +16,8 @@ import numpy as np
 from dropspin.comparisons.diagnosis.geometries import VOLUMES
 from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of, overrides, plain
-from dropspin.comparisons.diagnosis.mujoco_file import BOX, ELLIPTIC, GEOM, PLANE, MuJoCoFile, set_options
+from dropspin.comparisons.diagnosis.mujoco_file import BOX, GEOM, PLANE, MuJoCoFile
+from dropspin.comparisons.diagnosis.mujoco_options import ELLIPTIC, set_options
 from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, kind_of, mesh_of, quaternion, shape_of
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM
 from dropspin.comparisons.running.driving import Breakdown

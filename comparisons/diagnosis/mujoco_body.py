@@ -16,7 +16,8 @@ from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_changes import ignored
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
 from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of
-from dropspin.comparisons.diagnosis.mujoco_file import ADDED, ELLIPTIC, ENUMERATIONS, OF_ALL, PLANE, MuJoCoFile
+from dropspin.comparisons.diagnosis.mujoco_file import ADDED, PLANE, MuJoCoFile
+from dropspin.comparisons.diagnosis.mujoco_options import ELLIPTIC, ENUMERATIONS, OF_ALL
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.engines.base import Diverged

@@ -14,6 +14,7 @@ from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mjcf_defaults import option_setting
 from dropspin.comparisons.diagnosis.mujoco_compiled import placed
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of
+from dropspin.comparisons.diagnosis.mujoco_options import set_options
 from dropspin.comparisons.diagnosis.mujoco_recompiled import LEAST
 from dropspin.comparisons.diagnosis.mujoco_shapes import ALONG, distance_to, listed
 from dropspin.comparisons.diagnosis.urdf_file import package_remedy, verify_one_root
@@ -29,13 +30,7 @@ PLANE, BOX = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX
 EQUALITIES = "equality constraints"
 SURFACES = (int(PLANE), int(BOX))
 """The kinds of geometries that a body may land on."""
-ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
-ENUMERATIONS = {"RK4": int(mujoco.mjtIntegrator.mjINT_RK4), "elliptic": ELLIPTIC}
-"""Values of options in the words of MJCF."""
 UNMODELLED = {"nflex": "flexible bodies", "flg_surfacevel": "surface velocities", "flg_adhesion": "adhesion of geometries"}
-OPTIONS = [name for name in dir(mujoco.MjSpec().option) if not name.startswith("_")]
-OF_ALL = {*OPTIONS, "eulerdamp"}
-"""Changes that apply to all bodies: those of options, and the flag `eulerdamp`, which may be enabled."""
 MOST_NAMES, MOST_LISTED = 20, 3
 TURNED = 1e-6
 """Difference of |cos(angle / 2)| from 1 up to which two orientations are the same."""
@@ -290,17 +285,6 @@ class MuJoCoFile:
 
     def _collide(self, own: Sequence[int], other: int) -> bool:
         return any(contact_of(self.model, one, other) for one in own)
-
-
-def set_options(option: Any, compiled: Any, dt: float, changes: Changes) -> None:
-    """Give a specification the options of a compiled model, but for the time step [s] and changes; without the automatic reset."""
-    for name in OPTIONS:
-        value = changes.get(name, getattr(compiled, name))
-        setattr(option, name, ENUMERATIONS[value] if isinstance(value, str) else value)
-    option.timestep = dt
-    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    if "eulerdamp" in changes:
-        option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
 
 
 def one_line(error: Exception) -> str:

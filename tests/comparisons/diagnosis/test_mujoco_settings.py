@@ -418,10 +418,10 @@ def test_friction_of_a_floor_that_the_dimension_of_a_contact_leaves_out_is_named
     }
     both = "used in part: torsional friction needs condim 4 and rolling friction needs condim 6"
     assert found[3] == [
-        ("friction", 'friction="1 .02 .0001"', "used in part: torsional friction needs condim 4"),
-        ("friction in line 2", floor, both),
+        ("friction in line 3", 'friction="1 .02 .0001"', "used in part: torsional friction needs condim 4"),
+        ("friction", floor, both),
     ]
-    assert found[4] == [("friction in line 2", floor, "used in part: rolling friction needs condim 6")]
+    assert found[4] == [("friction", floor, "used in part: rolling friction needs condim 6")]
     assert found[6] == []
 
 

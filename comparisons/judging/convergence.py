@@ -13,6 +13,7 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.judging.error_budget import ErrorBudget, error_budget, is_sufficient, vector_budget, widened
+from dropspin.comparisons.judging.series import ABOVE_NOISE
 from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY, Cause
 from dropspin.comparisons.measuring.comparison import Unresolved
 from dropspin.comparisons.measuring.contact_runs import Mask
@@ -115,6 +116,7 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
         remark: Which time steps were added.
     """
     dts, floor = np.array([point.dt for point in series]), negligible(scene, metric.unit)
+    at = int(np.argmin(dts))
     rounded = rounding(scene, metric.unit, claim.precision, np.array([point.steps for point in series], dtype=float))
 
     def judged(part: Part) -> Judged:
@@ -123,14 +125,15 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
         if metric.name in JUMPING:  # the step changes it by chance, as far as it has changed it at all
             chance = float(np.nanmax(errors, initial=-math.inf) - np.nanmin(errors, initial=math.inf))
         noise = STANDARD_DEVIATIONS * np.maximum(resolutions, chance)
-        return error_budget(dts, errors, claim.order, noise, rounded, signed=metric.signed, negligible=floor), errors
+        budget = error_budget(dts, errors, claim.order, noise, rounded, signed=metric.signed, negligible=floor)
+        if budget.cause == "unresolved" and _grows(dts, errors, noise, LARGE * scale(scene, metric.unit)):
+            budget = _without_limit(budget, float(errors[at]), float(noise[at]))
+        return budget, errors
 
-    (length, errors), at = _worst(series, judged, floor), int(np.argmin(dts))
+    length, errors = _worst(series, judged, floor)
     has_value = not math.isnan(length.asymptotic_error)
     vector = _budget_of_components(scene, claim, metric, series, np.isfinite(errors), rounded) if has_value else None
     budget = length if vector is None else _corrected(length, vector, abs(float(errors[at])), max(floor, float(rounded[at])))
-    if budget.cause == "unresolved" and metric.name not in JUMPING and _grows(dts, errors, LARGE * scale(scene, metric.unit)):
-        budget = _without_limit(budget, float(errors[at]))
     order_tolerance = math.nan
     if budget.dts and metric.name not in JUMPING:
         used, limit = np.isin(dts, budget.dts), 0.0 if length.cause == "discretisation" else length.asymptotic_error
@@ -143,19 +146,21 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     return Convergence(budget, series[at].dt, order_tolerance, is_open, remark, finest_error)
 
 
-def _grows(dts: Array, errors: Array, large: float) -> bool:
-    """Whether an error grows at least as fast as 1/dt over the three finest time steps, and is large at the finest one.
+def _grows(dts: Array, errors: Array, noise: Array, large: float) -> bool:
+    """Whether an error grows at least as fast as 1/dt over the three finest time steps, by more than its noise, to more than `large`.
 
-    An error that vanishes, a c dt + b c dt² + …, does so only if three of its terms cancel at the coarsest of these steps.
+    An error that vanishes, a dt + b dt² + c dt³ + …, does so only if three of its terms cancel at the coarser ones of these steps.
     """
-    h, sizes = dts[finest_first := np.argsort(dts)[:3]], np.abs(errors[finest_first])
-    return is_sufficient(list(h)) and bool(sizes[0] > large and np.all(np.diff(sizes * h) <= 0.0))
+    finest_first = np.argsort(dts)[:3]
+    h, sizes, by_chance = dts[finest_first], np.sign(errors[np.argmin(dts)]) * errors[finest_first], ABOVE_NOISE * noise[finest_first]
+    grows = sizes[0] - sizes[1] > by_chance[:2].max() and np.all(np.diff(np.abs(sizes) * h) <= 0.0)
+    return is_sufficient(list(h)) and bool(grows and sizes[1] > 0.0 and sizes[0] > large)
 
 
-def _without_limit(budget: ErrorBudget, finest: float) -> ErrorBudget:
-    """The budget of an error that grows with finer time steps: at least the error at the finest of them remains."""
-    upper = max(budget.upper, finest) if finest > 0.0 else finest
-    lower = min(budget.lower, finest) if finest < 0.0 else finest
+def _without_limit(budget: ErrorBudget, finest: float, noise: float) -> ErrorBudget:
+    """The budget of an error that grows with finer time steps: at least the error at the finest of them, less its noise, remains."""
+    least = finest - math.copysign(ABOVE_NOISE * noise, finest)
+    lower, upper = (least, max(budget.upper, finest)) if finest > 0.0 else (min(budget.lower, finest), least)
     reason = "grows at least as fast as 1/dt at the finest time steps, and approaches no value"
     return ErrorBudget("model", reason, finest, lower, upper)
 

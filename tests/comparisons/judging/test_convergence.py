@@ -131,14 +131,19 @@ def test_interval_of_an_error_that_vanishes_contains_the_limit_of_the_other_sign
 def test_error_that_grows_as_fast_as_the_inverse_time_step_is_a_model_error():
     """That of an engine that ignores the time step, and simulates longer with finer ones; slower growth and small errors may be chance."""
 
-    def found(*sizes):
-        return cause_of({dt: [[size, 0.0]] for dt, size in zip((0.004, 0.002, 0.001), sizes, strict=True)})
+    def found(*errors, resolution=0.0):
+        scene, parts = ds.load("drop-ball"), [Average(np.array([error]), *np.full((2, 1), resolution)) for error in errors]
+        series = [SeriesPoint(dt, scene.steps(dt), each, None, 1e-9) for dt, each in zip((0.004, 0.002, 0.001), parts, strict=True)]
+        return convergence(scene, Claim("mine", None, np.float64), ds.METRICS["bounce_height_error"], series).budget
 
-    grown = found(0.376, 15.3, 77.1)
-    assert (grown.cause, grown.lower) == ("model", 77.1)
+    grown = found(-0.376, -15.3, -77.1)
+    assert (grown.cause, grown.upper) == ("model", -77.1)
     assert "grows at least as fast as 1/dt" in grown.reason
+    assert found(0.376, 15.3, 77.1, resolution=10.0).lower == pytest.approx(62.1)
     assert found(0.02, 0.03, 0.04).cause == "unresolved"
     assert found(0.376e-4, 15.3e-4, 77.1e-4).cause == "unresolved"
+    assert found(0.01, 0.05, 0.2, resolution=0.2).cause == "unresolved"  # within the sampling noise
+    assert found(0.01, -0.05, 0.2).cause == "unresolved"
 
 
 def average(parts):

@@ -118,7 +118,7 @@ def _plausible(scene: Scenario, where: str) -> Scenario:
     if scene.floor is not None and g.any() and abs(g[1]) <= ALONG_FLOOR * np.linalg.norm(g):
         warnings.warn(
             f"{where}: gravity.acceleration: got {g.tolist()}, along the floor, so that the body does not fall onto it; "
-            "y is up and the floor is y = 0: in a file with z up, exchange y and z of all vectors.",
+            "y is up and the floor is y = 0: with z up, write (x, z, -y) for each vector (x, y, z), and exchange lengths along y and z.",
             SceneWarning,
             stacklevel=3,
         )

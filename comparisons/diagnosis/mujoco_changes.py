@@ -116,17 +116,18 @@ def _meshes(text: BodyText) -> Iterator[Ignored]:
 def _of_links(text: BodyText) -> Iterator[Ignored]:
     """Of the links in a URDF file: a mass that follows from the geometries, and settings of contacts."""
     links = {link.attributes.get("name", ""): link for link in text.file.source.every("link")}
-    for number in text.group:
-        if (link := links.get(name := mujoco.mj_id2name(text.model, BODY, number))) is None:
-            continue
+    names = {number: mujoco.mj_id2name(text.model, BODY, number) for number in text.group}
+    own = {number: links[name] for number, name in names.items() if name in links}
+    collides = any(next(link.every("collision"), None) for link in own.values())
+    for number, link in own.items():
         if (mass := text.model.body_mass[number]) > 0.0 and next(link.every("inertial"), None) is None:
-            words = Setting(f"no inertial in link {name}", link.file, link.line)
+            words = Setting(f"no inertial in link {names[number]}", link.file, link.line)
             yield "inertial", words, f"missing: the mass is {mass:.4g} kg, that of the geometries at the default density"
         unread = [found for tag, value in IN_FORCE.items() for found in link.every(tag) if found.number("value", value) != value]
-        of_link = "" if number == text.head else f" of {name}"
+        of_link = "" if number == text.head else f" of {names[number]}"
         for found in (*unread, *used_by_neither_engine(link)):
             yield found.tag + of_link, found.words, "not read"
-        for key, words, made in without_collision(link):
+        for key, words, made in () if collides else without_collision(link):
             yield key + of_link, words, made
 
 

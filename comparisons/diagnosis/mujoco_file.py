@@ -128,7 +128,7 @@ class MuJoCoFile:
 
     def others(self, chosen: Sequence[str]) -> str:
         """The bodies with mass beside some that are chosen, why they are not free, and what to do; empty if there are none."""
-        names = [name for name in self._heavy if name not in chosen]
+        names = [name for name in self._heavy if name not in chosen and self.model.body_mocapid[self.heads[name]] < 0]
         verbs = ("moves", "carries", "is") if len(names) == 1 else ("move", "carry", "are")
         are = "{} on joints, {} others on joints or {} tied".format(*verbs)
         there = f"{', '.join(names[:MOST_NAMES])}{' and others' * (len(names) > MOST_NAMES)} {are}"

@@ -181,7 +181,7 @@ class BodyText:
             found += [body.changed({"gravcomp": others["gravcomp"]}) for body in self._bodies if "gravcomp" in body.attributes]
         if contact := {name: value for name, value in others.items() if name in ("solref", "solimp", "margin", "condim")}:
             found += self._with_contact(contact)
-        return ", ".join(map(str, found)) or " ".join(f'{name}="{value}"' for name, value in others.items())
+        return ", ".join(dict.fromkeys(map(str, found))) or " ".join(f'{name}="{value}"' for name, value in others.items())
 
     def _with_options(self, options: Mapping[str, object]) -> list[Setting | str]:
         """The elements with other options, and with another flag."""

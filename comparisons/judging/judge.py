@@ -78,8 +78,9 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, conver
     The difference from a recording that remains is `measured`.
 
     A model error or a setting error is `known` if an expectation for this engine at its finest time step allows values of its interval,
-    `limited` if a known limitation explains an error as small as the nearer end of the interval, and fails otherwise. An unresolved one is
-    `measured`. A vanishing error passes, also where a known fault is expected at a time step: whether that fault occurs is judged there.
+    `limited` if a known limitation explains an error as small as the nearer end of the interval, or as that at the finest time step, and
+    fails otherwise. An unresolved one is `measured`. A vanishing error passes, also where a known fault is expected at a time step: whether
+    that fault occurs is judged there.
     """
     budget = convergence.budget
     if math.isnan(budget.asymptotic_error) and not abs(convergence.finest_error) > negligible(scene, metric.unit):
@@ -93,7 +94,7 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, conver
         if bounds and all(budget.lower <= upper and budget.upper >= lower for lower, upper in bounds):
             verdict, reason = "known", "; ".join(expected.reason for expected in allowing)
         else:
-            explained = _explained(claim, metric, max(budget.lower, -budget.upper))
+            explained = _explained(claim, metric, np.fmin(max(budget.lower, -budget.upper), abs(convergence.finest_error)))
             verdict, reason = "limited" if explained else "failed", joined(*explained, f"{reason}; no time step removes it")
     reason += f" ({convergence.remark})" if convergence.remark else ""
     if verdict == "failed" and budget.cause == "setting":

@@ -98,6 +98,7 @@ def _decayed(rate: float, turned: Array) -> Array:
     return -np.expm1(-rate * turned) / rate
 
 
+@np.errstate(divide="ignore", invalid="ignore")  # where the pace is 0 or overflows, the interval is halved
 def _inverse(time: Callable[[Array], Array], pace: Callable[[Array], Array], t: Array) -> Array:
     """λ at each time, by Newton's method within a shrinking interval; `time` increases with the pace dt/dλ."""
     low, high = np.zeros(len(t)), np.ones(len(t))

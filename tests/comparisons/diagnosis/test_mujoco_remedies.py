@@ -99,23 +99,18 @@ def test_free_joint_keeps_its_name(tmp_path):
     assert body.patch(body.remedies["damping"], body.dt).startswith('<freejoint name="root"/>')
 
 
-@pytest.mark.parametrize(
-    ("damping", "why"), [(1.0, "changes its sign from step to step and diverges"), (0.5, "changes its sign from step to step")]
-)
-def test_spin_that_explicit_damping_reverses_has_no_decay(tmp_path, damping, why):
-    """Each step multiplies it by 1 - c dt/I, with 1 - 2.75 or 1 - 1.38; with `eulerdamp` by 1/(1 + c dt/I)."""
+def test_spin_that_diverges_by_explicit_damping_has_no_decay(tmp_path):
+    """Each step multiplies it by 1 - c dt/I = 1 - 2.75; with `eulerdamp` by 1/(1 + c dt/I)."""
     head, moment = '<option><flag eulerdamp="disable"/></option>', (0.2**2 + 0.06**2) / 12
-    world = f'<body name="b" pos="0 0 1"><joint type="free" damping="{damping}"/><geom type="box" size=".1 .1 .03" mass="1"/></body>'
+    world = '<body name="b" pos="0 0 1"><joint type="free" damping="1"/><geom type="box" size=".1 .1 .03" mass="1"/></body>'
     body = body_of(tmp_path, world, 'timestep="0.01"', head=head)
     answer = next(iter(answers_to(spin, body)))
     [finding] = answer.findings
     assert (answer.detail, finding.kind, finding.settings) == ("none", "time step", ("eulerdamp",))
-    assert finding.detail == f"because the spin {why}"
     assert finding.remedies[0].text == '<flag eulerdamp="enable"/> (model.xml, line 1)'
-    assert finding.remedies[0].value == pytest.approx(0.01 / math.log1p(0.01 * damping / moment))
+    assert finding.remedies[0].value == pytest.approx(0.01 / math.log1p(0.01 / moment))
     [sentence] = sentences(BodyDiagnosis("b", "MuJoCo", answers=(answer,), settings=body.settings))
-    exact = "3.633 ms" if damping == 1.0 else "7.267 ms"
-    assert sentence.startswith(f"Spin, time step: 1/e time about x is none instead of {exact}, because the spin {why}: eulerdamp=")
+    assert sentence.startswith("Spin, time step: 1/e time about x is none instead of 3.633 ms, because the spin diverges: eulerdamp=")
 
 
 def test_option_of_a_urdf_goes_into_its_element(tmp_path):

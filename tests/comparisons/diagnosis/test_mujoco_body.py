@@ -312,6 +312,10 @@ def test_link_without_a_geometry_that_collides_is_named(tmp_path):
     for body in (of_mujoco, PyBulletModel(tmp_path / "model.urdf", "model.urdf").body("l", None)):
         found = {name: (setting.text, made) for name, setting, made in body.ignored}
         assert (body.surface, found["collision"]) == ("", ('<link name="l">', "missing: the link collides with nothing"))
+    joint = '<joint name="j" type="fixed"><parent link="l"/><child link="camera"/></joint>'
+    beside = f'<link name="l">{mass}{shape}{shape.replace("visual", "collision")}</link><link name="camera">{shape}</link>{joint}'
+    of_camera = body_of(tmp_path, f'<robot name="r">{beside}</robot>', file="model.urdf")
+    assert not [name for name, _, _ in of_camera.ignored if name.startswith("collision")]
 
 
 def test_an_answer_has_a_finding_for_each_cause(tmp_path):

@@ -227,7 +227,8 @@ def test_body_without_a_result_is_not_a_sound_one():
 def test_bodies_beside_a_free_one_that_are_not_free_are_named(tmp_path):
     arm = '<body name="arm"><joint type="hinge"/><geom size=".02"/></body>'
     other = f'<body name="other" pos="1 0 1"><freejoint/><geom size=".1"/>{arm}</body>'
-    (tmp_path / "two.xml").write_text(f"<mujoco><worldbody>{BALL.format('')}{other}</worldbody></mujoco>")
+    moved = '<body name="moved" mocap="true" pos="3 0 1"><geom size=".1"/></body>'
+    (tmp_path / "two.xml").write_text(f"<mujoco><worldbody>{BALL.format('')}{other}{moved}</worldbody></mujoco>")
     of_all, of_one = diagnose(tmp_path / "two.xml"), diagnose(tmp_path / "two.xml", bodies="b")
     assert [body.name for body in of_all.bodies] == ["b"]
     named = "other, arm move on joints, carry others on joints or are tied; name one with --body, or give --loose for all"

@@ -147,14 +147,14 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
 
 
 def _grows(dts: Array, errors: Array, noise: Array, large: float) -> bool:
-    """Whether an error grows at least as fast as 1/dt over the three finest time steps, by more than its noise, to more than `large`.
+    """Whether an error grows at least as fast as 1/dt over the three finest time steps, by more than its noise, from more than `large`.
 
     An error that vanishes, a dt + b dt² + c dt³ + …, does so only if three of its terms cancel at the coarser ones of these steps.
     """
     finest_first = np.argsort(dts)[:3]
     h, sizes, by_chance = dts[finest_first], np.sign(errors[np.argmin(dts)]) * errors[finest_first], ABOVE_NOISE * noise[finest_first]
     grows = sizes[0] - sizes[1] > by_chance[:2].max() and np.all(np.diff(np.abs(sizes) * h) <= 0.0)
-    return is_sufficient(list(h)) and bool(grows and sizes[1] > 0.0 and sizes[0] > large)
+    return is_sufficient(list(h)) and bool(grows and sizes[1] > large)
 
 
 def _without_limit(budget: ErrorBudget, finest: float, noise: float) -> ErrorBudget:
@@ -226,20 +226,20 @@ def _corrected(length: ErrorBudget, vector: ErrorBudget, finest: float, floor: f
 
 def _worst(series: Sequence[SeriesPoint], judged: Callable[[Part], Judged], floor: float) -> Judged:
     """The worst of the flights in which the error is largest at a time step, or one whose smaller error remains where theirs vanish."""
-    largest, others = _worst_parts(series)
+    (largest, others), at = _worst_parts(series), int(np.argmin([point.dt for point in series]))
     worst = judged(largest[0])
     for part in [*largest[1:], *others]:
         if worst[0].cause == "model":
             return worst
         if part not in others:
-            worst = _worse(worst, judged(part), floor)
+            worst = _worse(worst, judged(part), floor, at)
         elif others[part] > max(_reach(worst[0]), floor) and (other := judged(part))[0].cause == "model":
-            worst = _worse(worst, other, floor)
+            worst = _worse(worst, other, floor, at)
     return worst
 
 
-def _worse(largest: Judged, other: Judged, floor: float) -> Judged:
-    """The budget of the part that is largest at the finest step, or that of another one if it is worse and more of it may remain.
+def _worse(largest: Judged, other: Judged, floor: float, at: int) -> Judged:
+    """The budget of the part that is largest at the finest step, or that of another one if it is worse and more of it may remain; `at` is the place of that step.
 
     Without a model error its interval contains that of the other part, because either may be the larger one as dt → 0.
     """
@@ -248,7 +248,7 @@ def _worse(largest: Judged, other: Judged, floor: float) -> Judged:
         largest, other = other, largest
     (worse, errors), (second, _) = largest, other
     if worse.cause != "model" and (second.lower < worse.lower or second.upper > worse.upper):
-        worse = widened(replace(worse, lower=min(worse.lower, second.lower)), second.upper, float(np.nanmin(np.abs(errors))), floor)
+        worse = widened(replace(worse, lower=min(worse.lower, second.lower)), second.upper, abs(float(errors[at])), floor)
     return worse, errors
 
 

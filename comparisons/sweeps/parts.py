@@ -30,6 +30,8 @@ PART_TIME = 2.0
 """Duration of a part [s]: about the work that a killed sweep loses for each of its workers."""
 STEP_TIME, JOB_TIME = (1e-7, 5e-5), (1e-5, 5e-3)
 """Rough costs of a step and of a job [s]: of the reference implementation, of any other engine."""
+METRICS_TIME = 0.1
+"""Rough cost of added metrics [s], for which a job has an exact solution of its own."""
 MEASURING = Path(__file__).parents[1] / "measuring"
 
 
@@ -87,8 +89,9 @@ class Work:
         swept = {axis.name: axis.values for axis in self.sweep.axes}
         longest = max(swept.get("duration", [scene.duration for scene in self.sweep.scenes]))
         steps = longest / min([*self.sweep.dts, *swept.get("dt", [])])
-        slow = any(type(engine) is not Wang for engine in self.sweep.engines) or bool(self.sweep.metrics)
-        return int(min(max(PART_TIME / (JOB_TIME[slow] + STEP_TIME[slow] * steps), 1), LARGEST_PART))
+        slow, has_metrics = any(type(engine) is not Wang for engine in self.sweep.engines), bool(self.sweep.metrics)
+        job_time = JOB_TIME[slow or has_metrics] + STEP_TIME[slow or has_metrics] * steps + METRICS_TIME * has_metrics
+        return int(min(max(PART_TIME / job_time, 1), LARGEST_PART))
 
     @property
     def parts(self) -> Iterator[range]:

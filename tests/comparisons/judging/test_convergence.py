@@ -144,6 +144,7 @@ def test_error_that_grows_as_fast_as_the_inverse_time_step_is_a_model_error():
     assert found(0.376e-4, 15.3e-4, 77.1e-4).cause == "unresolved"
     assert found(0.01, 0.05, 0.2, resolution=0.2).cause == "unresolved"  # within the sampling noise
     assert found(0.01, -0.05, 0.2).cause == "unresolved"
+    assert found(0.0, 1e-4, 0.3).cause == "unresolved"  # at one time step alone
 
 
 def average(parts):

@@ -239,9 +239,10 @@ def _worst(series: Sequence[SeriesPoint], judged: Callable[[Part], Judged], floo
 
 
 def _worse(largest: Judged, other: Judged, floor: float, at: int) -> Judged:
-    """The budget of the part that is largest at the finest step, or that of another one if it is worse and more of it may remain; `at` is the place of that step.
+    """The budget of the part that is largest at the finest step, or that of another one if it is worse and more of it may remain.
 
-    Without a model error its interval contains that of the other part, because either may be the larger one as dt → 0.
+    Without a model error its interval contains that of the other part, because either may be the larger one as dt → 0; `at`
+    is the place of the finest step.
     """
     may_remain = _reach(other[0]) > max(_reach(largest[0]), floor)
     if may_remain and WORSE.get(other[0].cause, 0) > WORSE.get(largest[0].cause, 0):

@@ -153,8 +153,9 @@ def _grows(dts: Array, errors: Array, noise: Array, large: float) -> bool:
     """
     finest_first = np.argsort(dts)[:3]
     h, sizes, by_chance = dts[finest_first], np.sign(errors[np.argmin(dts)]) * errors[finest_first], ABOVE_NOISE * noise[finest_first]
-    grows = sizes[0] - sizes[1] > by_chance[:2].max() and np.all(np.diff(np.abs(sizes) * h) <= 0.0)
-    return is_sufficient(list(h)) and bool(grows and sizes[1] > large)
+    if not (is_sufficient(list(h)) and np.isfinite(sizes).all() and sizes[1] > large):
+        return False
+    return bool(sizes[0] - sizes[1] > by_chance[:2].max() and np.all(np.diff(np.abs(sizes) * h) <= 0.0))
 
 
 def _without_limit(budget: ErrorBudget, finest: float, noise: float) -> ErrorBudget:

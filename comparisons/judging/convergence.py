@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dropspin.comparisons.engines.base import KnownLimitation
-from dropspin.comparisons.judging.error_budget import ErrorBudget, error_budget, is_sufficient, vector_budget, widened
-from dropspin.comparisons.judging.series import ABOVE_NOISE
+from dropspin.comparisons.judging.error_budget import ErrorBudget, error_budget, growing, is_sufficient, vector_budget, widened
+from dropspin.comparisons.judging.series import grows_without_limit
 from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY, Cause
 from dropspin.comparisons.measuring.comparison import Unresolved
 from dropspin.comparisons.measuring.contact_runs import Mask
@@ -126,8 +126,8 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
             chance = float(np.nanmax(errors, initial=-math.inf) - np.nanmin(errors, initial=math.inf))
         noise = STANDARD_DEVIATIONS * np.maximum(resolutions, chance)
         budget = error_budget(dts, errors, claim.order, noise, rounded, signed=metric.signed, negligible=floor)
-        if budget.cause == "unresolved" and _grows(dts, errors, noise, LARGE * scale(scene, metric.unit)):
-            budget = _without_limit(budget, float(errors[at]), float(noise[at]))
+        if budget.cause == "unresolved" and grows_without_limit(dts, errors, noise, LARGE * scale(scene, metric.unit)):
+            budget = growing(budget, float(errors[at]), float(noise[at]))
         return budget, errors
 
     length, errors = _worst(series, judged, floor)
@@ -144,26 +144,6 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     is_open = deciding.cause == "unresolved" and has_value and float(np.nanmax(np.abs(errors))) > floor
     finest_error = series[at].average.value if is_sufficient(list(dts)) else math.nan
     return Convergence(budget, series[at].dt, order_tolerance, is_open, remark, finest_error)
-
-
-def _grows(dts: Array, errors: Array, noise: Array, large: float) -> bool:
-    """Whether an error grows at least as fast as 1/dt over the three finest time steps, by more than its noise, from more than `large`.
-
-    An error that vanishes, a dt + b dt² + c dt³ + …, does so only if three of its terms cancel at the coarser ones of these steps.
-    """
-    finest_first = np.argsort(dts)[:3]
-    h, sizes, by_chance = dts[finest_first], np.sign(errors[np.argmin(dts)]) * errors[finest_first], ABOVE_NOISE * noise[finest_first]
-    if not (is_sufficient(list(h)) and np.isfinite(sizes).all() and sizes[1] > large):
-        return False
-    return bool(sizes[0] - sizes[1] > by_chance[:2].max() and np.all(np.diff(np.abs(sizes) * h) <= 0.0))
-
-
-def _without_limit(budget: ErrorBudget, finest: float, noise: float) -> ErrorBudget:
-    """The budget of an error that grows with finer time steps: at least the error at the finest of them, less its noise, remains."""
-    least = finest - math.copysign(ABOVE_NOISE * noise, finest)
-    lower, upper = (least, max(budget.upper, finest)) if finest > 0.0 else (min(budget.lower, finest), least)
-    reason = "grows at least as fast as 1/dt at the finest time steps, and approaches no value"
-    return ErrorBudget("model", reason, finest, lower, upper)
 
 
 def beside_recording(result: Convergence, uncertainty: float) -> Convergence:

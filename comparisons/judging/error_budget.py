@@ -208,6 +208,14 @@ def widened(budget: ErrorBudget, upper: float, finest: float, negligible: float)
     return replace(wider, reason=reason)
 
 
+def growing(budget: ErrorBudget, finest: float, noise: float) -> ErrorBudget:
+    """The budget of an error that grows with finer time steps: at least the error at the finest of them, less its noise, remains."""
+    least = finest - math.copysign(ABOVE_NOISE * noise, finest)
+    lower, upper = (least, max(budget.upper, finest)) if finest > 0.0 else (min(budget.lower, finest), least)
+    reason = "grows at least as fast as 1/dt at the finest time steps, and approaches no value"
+    return ErrorBudget("model", reason, finest, lower, upper)
+
+
 def vector_budget(
     dts: Array, components: Array, claimed_order: float | None, resolution: Array, rounding: Array, negligible: float
 ) -> ErrorBudget:

@@ -120,6 +120,20 @@ def falls_ever_faster(h: Array, e: Array, small: Array) -> bool:
     return bool(is_noticeable and (falls >= 0.0).all() and (np.diff(falls) > 0.0).all())
 
 
+def grows_without_limit(dts: Array, errors: Array, noise: Array, large: float) -> bool:
+    """Whether an error grows at least as fast as 1/dt over the three finest time steps, by more than its noise, from more than `large`.
+
+    An error that vanishes, a dt + b dt² + c dt³ + …, does so only if three of its terms cancel at the coarser ones of these steps.
+    """
+    finest_first = np.argsort(dts)[:FEWEST_TIME_STEPS]
+    h, sizes, by_chance = dts[finest_first], np.sign(errors[np.argmin(dts)]) * errors[finest_first], ABOVE_NOISE * noise[finest_first]
+    if len(h) < FEWEST_TIME_STEPS or h[-1] / h[0] < SMALLEST_RATIO:
+        return False
+    if not (np.isfinite(sizes).all() and sizes[1] > large):
+        return False
+    return bool(sizes[0] - sizes[1] > by_chance[:2].max() and np.all(np.diff(np.abs(sizes) * h) <= 0.0))
+
+
 def fitted_order(h: Array, rest: Array, small: Array) -> tuple[float, tuple[float, ...]]:
     """The slope of the error without the asymptotic error, over the finest steps above the noise, and these steps.
 

@@ -1,7 +1,8 @@
 """Ensembles: beyond its horizon no single trajectory of a chaotic scene can be compared, but means over many starts can.
 
 Every engine runs the same starts. Means over them are compared, each with the 95 % confidence interval of Student's t. Differences between
-two engines are taken start by start, so that what they have in common is not noise.
+two engines are taken start by start, so that what they have in common is not noise. The intervals of all differences of a scene at a time
+step contain their values together with 95 % confidence, because one that excludes 0 is a finding (Bonferroni's correction).
 """
 
 from collections.abc import Iterator
@@ -60,19 +61,27 @@ def judge_means(scene: Scenario, dt: float, outcome: EnsembleOutcome) -> Iterato
         yield name, Judgement(mean, "measured", mean - half, mean + half, "chaotic", tolerance=allowed)
 
 
-def judge_differences(first: EnsembleOutcome, second: EnsembleOutcome) -> Iterator[tuple[str, Judgement]]:
-    """Each ensemble metric and the mean difference of two engines, start by start, and whether it is significant."""
+def judge_differences(first: EnsembleOutcome, second: EnsembleOutcome, pairs: int = 1) -> Iterator[tuple[str, Judgement]]:
+    """Each ensemble metric and the mean difference of two engines, start by start, and whether it is significant.
+
+    Args:
+        first: The outcome of an engine.
+        second: The outcome of another engine.
+        pairs: Number of pairs of engines that are compared.
+    """
+    together = pairs * len(ENSEMBLE_METRICS)
     for name, metric in ENSEMBLE_METRICS.items():
         differences = metric.of_each(first) - metric.of_each(second)
-        mean, half = _mean(differences)
+        mean, half = _mean(differences, together)
         significance = "not significant" if mean - half <= 0.0 <= mean + half else "significant"
-        reason = f"the difference is {significance} at 95 % confidence, over {len(differences)} starts"
+        reason = f"the difference is {significance} at 95 % confidence for {together} differences together, over {len(differences)} starts"
         yield name, Judgement(mean, "measured", mean - half, mean + half, "chaotic", reason)
 
 
-def _mean(values: Array) -> tuple[float, float]:
-    """The mean, and half the width of its confidence interval."""
+def _mean(values: Array, judged_together: int = 1) -> tuple[float, float]:
+    """The mean, and half the width of its confidence interval, which is wider if several intervals are judged together."""
     from scipy.special import stdtrit  # the quantiles of Student's t; scipy.stats takes a second to import, in each engine's process
 
     error = float(np.std(values, ddof=1)) / len(values) ** 0.5
-    return float(np.mean(values)), float(stdtrit(len(values) - 1, 0.5 + 0.5 * CONFIDENCE)) * error
+    outside = (1.0 - CONFIDENCE) / judged_together
+    return float(np.mean(values)), float(stdtrit(len(values) - 1, 1.0 - 0.5 * outside)) * error

@@ -72,19 +72,20 @@ def _at_step(
     phases = phases_at(own, dt)
     cases = [study.run_at(dt, phases, timings[own.scene.name, study.entry.label, dt]) for study in studies]
     compared = [(study.outcomes[-1], of_study) for study, of_study in zip(studies, cases, strict=True) if of_study]
-    agreements = [row for pair in combinations(compared, 2) for row in _agreement(own, *pair)]
+    pairs = list(combinations(compared, 2))
+    agreements = [row for pair in pairs for row in _agreement(own, *pair, len(pairs))]
     measures_distances = is_finest and own.scene.recording is None
     return agreements, list(_distances_to_other_laws(own.scene, dt, phases, compared)) if measures_distances else []
 
 
-def _agreement(own: StartPhase, first: Compared, second: Compared) -> Iterator[Measurement]:
-    """The differences between two engines."""
+def _agreement(own: StartPhase, first: Compared, second: Compared, pairs: int) -> Iterator[Measurement]:
+    """The differences between two engines, of which a number of pairs is compared."""
     ((case, _, one, _, _), cases), ((_, _, other, _, _), other_cases) = first, second
     shared = one.discretisation if one.discretisation == other.discretisation else None
     for metric, judgement in judge_agreement(own.scene, own.truth, cases, other_cases, shared):
         yield case.measurement("agreement", metric.name, metric.unit, judgement, other.claim.label)
     if one.outcome is not None and other.outcome is not None:
-        for name, judgement in judge_differences(one.outcome, other.outcome):
+        for name, judgement in judge_differences(one.outcome, other.outcome, pairs):
             yield case.measurement("agreement", name, ENSEMBLE_METRICS[name].unit, judgement, other.claim.label)
 
 

@@ -58,7 +58,7 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         SceneError: The scene is not valid. The message gives the file or mapping, the key, the value and the allowed values.
     """
     if isinstance(scene, Mapping):
-        return _plausible(from_mapping(_with_files(dict(scene), Path())), "scene")
+        return _plausible(from_mapping(_with_files(dict(scene), Path(), "scene")), "scene")
     if not isinstance(scene, str | Path):
         raise SceneError(f"scene: got {shown(scene)} ({type(scene).__name__}); give a catalogue name, a path or a mapping.")
     if isinstance(scene, str) and (drawn := re.fullmatch(DRAWN, scene)):
@@ -72,13 +72,16 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         str(path).encode()
     except UnicodeEncodeError:
         raise SceneError(f"{str(path)!a}: the file's name is not UTF-8 text; rename it.") from None
-    loaded = from_table(path.stem, str(scene), _with_files(read_toml(path, str(scene)), path.parent))
+    loaded = from_table(path.stem, str(scene), _with_files(read_toml(path, str(scene)), path.parent, str(scene)))
     return loaded if path.parent == CATALOGUE else _plausible(loaded, str(scene))
 
 
-def _with_files(content: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """The content of a scene's file with that of the files that it names."""
-    return with_recording(with_mesh(content, folder), folder)
+def _with_files(content: dict[str, Any], folder: Path, where: str) -> dict[str, Any]:
+    """The content of a scene's file with that of the files that it names; messages begin with `where`."""
+    try:
+        return with_recording(with_mesh(content, folder), folder)
+    except SceneError as error:
+        raise SceneError(f"{where}: {error}") from None
 
 
 def with_mesh(content: dict[str, Any], folder: Path) -> dict[str, Any]:

@@ -112,14 +112,14 @@ def as_scenes(scenes: SceneLike | Iterable[SceneLike], default: Iterable[str] = 
 def verify_time_step(scene: Scenario, dt: float, engines: int = 0) -> None:
     """Raise `DropspinError` unless a scene is a sensible number of steps of dt [s], also for a run that compares `engines`."""
     most = min(MOST_ROWS, MOST_STATES // (engines + 3)) if engines else MOST_STEPS
-    so_that = f" in a run of {counted(engines, 'engine')}, whose motions are in memory together," if engines else ""
+    so_that = f" in a run of {counted(engines, 'engine')}, whose motions are in memory together" if engines else ""
     if isinstance(dt, bool) or not isinstance(dt, int | float | np.floating):
         raise DropspinError(f"dt: got {described_value(dt)}; a time step is a number of seconds.")
     if not (np.isfinite(dt) and dt > 0.0 and FEWEST_STEPS <= scene.duration / dt + 1e-9 < most + 1):
-        raise DropspinError(
-            f"dt: got {dt!r} s; scene {scene.name!r} lasts {scene.duration:g} s, so a step must be "
-            f"at least {scene.duration / most:.10g} s{so_that} and at most {scene.duration / FEWEST_STEPS:.10g} s."
-        )
+        allowed = f"least {scene.duration / most:.10g} s{so_that}"
+        if dt * FEWEST_STEPS > scene.duration:
+            allowed = f"most {scene.duration / FEWEST_STEPS:.10g} s"
+        raise DropspinError(f"dt: got {dt!r} s; scene {scene.name!r} lasts {scene.duration:g} s, so a step must be at {allowed}.")
 
 
 def described_value(value: object) -> str:

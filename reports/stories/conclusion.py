@@ -40,7 +40,7 @@ def conclusion(results: Results) -> list[Point]:
         return []
     if not questions and results.breakdowns.any():
         return [Point("No recommendation: no engine has an error to judge.")]
-    none = f"No recommendation: a question needs {ENOUGH} scenes that test it. dropspin run, without names, runs the core catalogue."
+    none = f"No recommendation: it takes {ENOUGH} scenes with the same kind of error. dropspin run, without names, runs the core catalogue."
     return [Point(text) for text in [*(_statement(answers, within) for answers in list(questions.values())[:MOST_QUESTIONS]), none]]
 
 

@@ -216,7 +216,7 @@ def test_each_claim_is_that_of_the_rows(seed):
         elif few := re.fullmatch(rf"(.+) {size}: (.+)\.", sentence):
             verify_statement(run, METRICS[few[1].lower()], few[2])
         else:
-            assert re.match("1 s of motion|No recommendation: a question needs 3 scenes", sentence)
+            assert re.match("1 s of motion|No recommendation: it takes 3 scenes", sentence)
 
 
 def test_scenes_in_which_the_only_engine_broke_down_are_exceptions():

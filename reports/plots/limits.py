@@ -27,6 +27,8 @@ COLOURS = {
     "crashed": "#000000",
     "timed_out": "#8C8C8C",
 }
+SAME_MOTION = "#D5D5D5"
+"""Along an axis that does not change the exact motion: the engine has its failure mode, if any, at every value."""
 BAR = 10.0  # points
 
 
@@ -40,7 +42,7 @@ def failure_modes(found: LimitsStudy, axis_name: str) -> Chart:
     scans = [scan for scan in found.scans if scan.axis.name == axis_name]
     axis = scans[0].axis
     bars = [bar for row, scan in enumerate(scans) for bar in _bars(scan, row)]
-    order = [_in_words(mode) for mode in FAILURE_MODES]
+    order = ["same motion", *map(_in_words, FAILURE_MODES)]
     nominal = Line(
         "nominal value", np.full(2, axis.coordinate(scans[0].base)), np.array([-0.5, len(scans) - 0.5]), width=1.0, dashes="dotted"
     )
@@ -68,7 +70,9 @@ def _bars(scan: AxisScan, row: int) -> Iterator[Line]:
     left = place(scan.points[0].value)
     for inside, outside in [*scan.transitions, (scan.points[-1], scan.points[-1])]:
         right = 0.5 * (place(inside.value) + place(outside.value))
-        yield Line(_in_words(inside.mode), np.array([left, right]), np.full(2, float(row)), COLOURS[inside.mode], BAR)
+        is_same = scan.axis.invariant and inside.mode == "sound"
+        label, colour = ("same motion", SAME_MOTION) if is_same else (_in_words(inside.mode), COLOURS[inside.mode])
+        yield Line(label, np.array([left, right]), np.full(2, float(row)), colour, BAR)
         left = right
 
 

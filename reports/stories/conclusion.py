@@ -71,9 +71,10 @@ def _use(answer: Answer) -> str:
 
 
 def _count(answer: Answer, within: float) -> str:
-    """In how many scenes an engine that is not recommended is within the tolerance."""
-    count = f"within {_limit(answer.metric, within)} in {len(answer.within)} of {answer.scenes} scenes"
-    return f"{in_sentence(answer.engine)}{_in_brackets(count, _size(answer, names_worst=True))}"
+    """In how many of the scenes in which it has a result an engine that is not recommended is within the tolerance."""
+    tested = _tested(answer)
+    count = f"within {_limit(answer.metric, within)} in {len(answer.within)} of {counted(tested, 'scene')}" if tested else ""
+    return f"{in_sentence(answer.engine)}{_in_brackets(count, _size(answer, names_worst=True))}{_absent(answer)}"
 
 
 def _statement(answers: Sequence[Answer], within: float) -> str:
@@ -140,9 +141,14 @@ def _in_brackets(*texts: str) -> str:
     return f" ({', '.join(filter(None, texts))})" if any(texts) else ""
 
 
+def _tested(answer: Answer) -> int:
+    """The number of scenes in which an engine has a result."""
+    return len(answer.within) + len(answer.beyond) + len(answer.undecided)
+
+
 def _absent(answer: Answer) -> str:
     """The number of scenes in which an engine has no result."""
-    count = answer.scenes - len(answer.within) - len(answer.beyond) - len(answer.undecided)
+    count = answer.scenes - _tested(answer)
     if not count:
         return ""
     return f", {counted(count, 'scene')} declined" if count == answer.declined else f", no result in {counted(count, 'scene')}"

@@ -161,12 +161,12 @@ def verify_use(run, metric, engine, clause):
     verify_size(run, metric, engine, clause, kinds["beyond"])
 
 
-def verify_count(run, metric, engine, within, scenes, size):
-    """The number of scenes of an engine that is not recommended."""
+def verify_count(run, metric, engine, within, scenes, declined, without, size):
+    """The numbers of scenes of an engine that is not recommended: within the tolerance, with a result, and without one."""
     tested = scenes_of(run, metric)
     of = [found for scene in tested if (found := states(run, metric, engine, scene))]
     kept = [found for found in of if found[min(found)] == "within"]
-    assert (len(kept), len(tested)) == (within, scenes)
+    assert (len(kept), len(of), len(tested)) == (within, scenes, scenes + declined + without)
     beyond = {scene for scene in tested if (found := states(run, metric, engine, scene)) and found[min(found)] == "beyond"}
     verify_size(run, metric, engine, size, beyond)
     assert len(kept) < 3 or 2 * len(kept) <= len(of) or len(set(map(tuple, kept))) > 1
@@ -256,7 +256,10 @@ def test_an_error_that_grows_beyond_the_tolerance_at_smaller_steps_is_not_recomm
 def verify_counts(run, metric, clauses):
     """Clauses on engines that are not recommended."""
     for clause in clauses:
-        said = re.fullmatch(rf"(.+?) \(within \S+ (?:%|rad) in (\d+) of (\d+) scenes((?:, {SIZE})?)\)", clause)
-        engine, within, scenes, size = said.groups()
+        of_judged = rf"(?: \(within \S+ (?:%|rad) in (\d+) of (\d+) scenes?((?:, {SIZE})?)\))?"
+        said = re.fullmatch(rf"(.+?){of_judged}(?:, (?:(\d+) scenes? declined|no result in (\d+) scenes?))?", clause)
+        engine, within, scenes, size, *absent = said.groups()
         assert engine in run.engines
-        verify_count(run, metric, engine, int(within), int(scenes), f"{size})")
+        counts = [int(count or 0) for count in (within, scenes, *absent)]
+        assert bool(said[3]) == bool(counts[1])
+        verify_count(run, metric, engine, *counts, f"{size})")

@@ -91,6 +91,13 @@ def test_sound_range_around_the_nominal_value():
     ]
 
 
+def test_figure_of_an_axis_that_does_not_change_the_motion_does_not_call_engines_sound():
+    """An engine may have a failure mode at the nominal value, and so at each value at which its motion is the same."""
+    masses = (scan("a", ["sound"] * 4, "mass"), scan("b", ["sound", "sound", "inaccurate"], "mass"))
+    figure = plots.failure_modes(LimitsStudy(SPIN, 5e-3, 0.1, masses, {}, {"a": (points_of("inaccurate"),)}), "mass")
+    assert [line.label for line in figure.lines] == ["same motion", "same motion", "inaccurate", "nominal value"]
+
+
 def test_engine_that_is_accurate_at_no_step_has_the_smallest_one_tried():
     study = LimitsStudy(SPIN, 5e-3, 0.1, (scan("a", ["inaccurate", "inaccurate", "diverged"], "step"),), {}, {})
     [row] = limits.step_rows([study])

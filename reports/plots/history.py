@@ -61,6 +61,8 @@ def run_labels(history: History) -> list[str]:
     shown = versions or differing
     if not shown:
         return [name[:LONGEST_LABEL] for name in history.names]
-    if len(shown) == 1:
-        return [str(value) if column == "commit" else f"{column} {value}" for column in shown for value in stamps[column]]
-    return [", ".join(f"{column} {row[column]}" for column in shown)[:LONGEST_LABEL] for row in stamps.to_dict("records")]
+    if shown == ["commit"]:
+        return list(map(str, stamps["commit"]))
+    versions_of = stamps[shown].fillna("").to_dict("records")  # an engine may be absent from a run
+    labels = [", ".join(f"{name} {value}" if value else f"no {name}" for name, value in each.items()) for each in versions_of]
+    return labels if len(shown) == 1 else [label[:LONGEST_LABEL] for label in labels]

@@ -14,7 +14,7 @@ from dropspin.reports.plots.colours import engine_styles
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, reference_for
 from dropspin.scenarios.mechanics import angular_momentum
 from dropspin.scenarios.rotations import angle_between_orientations, conjugate, cross, dot, multiply
-from dropspin.scenarios.state import UP, Array
+from dropspin.scenarios.state import RATES, UP, Array
 
 Rows = NDArray[np.intp]
 
@@ -174,7 +174,9 @@ def _exact_motion(scene: Scenario, truth: Truth, times: Array) -> Motion:
     times = np.union1d(times, [event.time for event in truth.events])
     states = np.array([[event.before, event.after] for event in truth.events]).reshape(-1, 13)
     pairs = Trajectory.from_states(np.repeat([event.time for event in truth.events], 2), states)
-    before = np.arange(0, len(states), 2)
+    before = (
+        np.flatnonzero(np.any(states[::2, RATES] != states[1::2, RATES], axis=1)) * 2
+    )  # a change of friction is an event, but no impact
     impacts = Impacts(pairs.t[before], *contact_impulses(scene, pairs, before, before + 1))
     return Motion(truth.word, "", exactly(truth, times), None, impacts)
 

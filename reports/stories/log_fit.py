@@ -72,11 +72,12 @@ class FittedLog(Study):
 
 def interval(estimate: Estimate) -> str:
     """An estimate with its interval, or the bound that the tosses give."""
-    lower, upper = f"{estimate.lower:.3f}", f"{estimate.upper:.3f}"
     if estimate.has_lower and estimate.has_upper:
-        return f"{estimate.value:.3f} ({lower} to {upper})"
-    if estimate.has_lower or estimate.has_upper:
-        return f"at least {lower}" if estimate.has_lower else f"at most {upper}"
+        return f"{estimate.value:.3f} ({estimate.lower:.3f} to {estimate.upper:.3f})"
+    if estimate.has_lower:
+        return f"at least {math.floor(1e3 * estimate.lower + 1e-9) / 1e3:.3f}"  # a bound is rounded to the side on which it holds
+    if estimate.has_upper:
+        return f"at most {math.ceil(1e3 * estimate.upper - 1e-9) / 1e3:.3f}"
     return "not identified"
 
 

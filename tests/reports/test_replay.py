@@ -141,6 +141,12 @@ def test_impacts_of_the_exact_solution_are_its_events(results):
     assert {*found.impacts.times} <= {*found.frames.t}
 
 
+def test_event_without_an_impulse_is_no_impact():
+    """The friction of a box that turns on the floor begins to act; its impulses have no largest one, by which the page would scale them."""
+    [exact] = replay_together(ds.load("turn-box-flat"), 1e-2, {}).motions
+    assert not len(exact.impacts.times)
+
+
 def test_contact_over_adjacent_steps_is_one_impact(results):
     """A soft floor: a bounce over three steps, after a fall; its impulse is the sum, its time that of the largest part."""
     scene = results.scenes["drop-ball"]

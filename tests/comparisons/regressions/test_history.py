@@ -6,7 +6,7 @@ import pytest
 from support.releases import TURNING, Broken, Candidate, Euler, part, released
 
 from dropspin.comparisons.regressions.history import history
-from dropspin.reports.plots.history import result_over_runs
+from dropspin.reports.plots.history import result_over_runs, run_labels
 from dropspin.reports.stories.history import document
 from dropspin.scenarios import DropspinError
 
@@ -68,8 +68,10 @@ def test_history_of_one_run_is_refused(before):
 
 
 def test_scene_that_changed_while_an_engine_was_absent_moves_nothing(before, longer_fall):
-    """Results of the scene before its change are not compared with later ones."""
-    assert not history(dated(part(before, "fall-spin"), part(longer_fall, engines=["mujoco"]), longer_fall)).moves
+    """Results of the scene before its change are not compared with later ones; the figure's label of the run names the absent engine."""
+    runs = history(dated(part(before, "fall-spin"), part(longer_fall, engines=["mujoco"]), longer_fall))
+    assert not runs.moves
+    assert run_labels(runs) == ["candidate 1.0", "no candidate", "candidate 1.0"]
 
 
 def test_scene_that_returns_to_a_definition_is_compared_with_the_last_run_of_it(before, longer_fall):

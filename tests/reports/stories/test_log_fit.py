@@ -15,6 +15,11 @@ def test_interval_has_only_the_ends_that_the_tosses_give():
     assert texts == ["0.300 (0.200 to 0.400)", "at least 0.200", "at most 0.400", "not identified"]
 
 
+def test_bound_is_rounded_to_the_side_on_which_it_holds():
+    bounds = [Estimate("mujoco", "friction", 0.0, 0.20071, 0.00325, *ends) for ends in ((True, False), (False, True))]
+    assert list(map(interval, bounds)) == ["at least 0.200", "at most 0.004"]
+
+
 def test_restitution_that_differs_is_a_setting_and_unidentified_friction_is_explained():
     different = Transfer("restitution", "mujoco", "wang", -0.158, -0.195, -0.133, "different")
     equal = Transfer("friction", "mujoco", "wang", 0.001, -0.006, 0.008, "equal")

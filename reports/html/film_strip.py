@@ -53,7 +53,7 @@ def strip_of(replay: Replay) -> Strip:
     has_reference = not last.colour
     engines = replay.motions[:-1] if has_reference else replay.motions
     middle = last if has_reference else engines[0]
-    moments = _moments(middle, replay.interval)
+    moments = _moments(middle, replay.dt, replay.interval)
     times, size, shape = np.array(list(moments.values())), replay.scene.body.size, replay.scene.body.outline
     centres = middle.frames.position[_rows(middle, times)]
     away = [_offsets(motion, times, centres, replay.interval) for motion in engines]
@@ -81,15 +81,16 @@ def strip_of(replay: Replay) -> Strip:
     )
 
 
-def _moments(motion: Motion, interval: float) -> dict[str, float]:
-    """The moments by name, at frames [s]: around the first impact, or evenly spaced if there is none."""
+def _moments(motion: Motion, dt: float, interval: float) -> dict[str, float]:
+    """The moments by name [s]: the time step of the first impact and frames around it, or evenly spaced frames if there is none."""
     end, impacts = float(motion.frames.t[-1]), motion.impacts.times
     if len(impacts):
         following = float(impacts[1]) if len(impacts) > 1 else end
         found = {"start": 0.0, "impact": float(impacts[0]), "after": 0.5 * (float(impacts[0]) + following), "end": end}
     else:
         found = {"start": 0.0, "a third": end / 3.0, "two thirds": 2.0 * end / 3.0, "end": end}
-    return {name: interval * round(time / interval) for name, time in found.items()}
+    steps = {name: dt if name == "impact" else interval for name in found}
+    return {name: steps[name] * round(time / steps[name]) for name, time in found.items()}
 
 
 def _rows(motion: Motion, times: Array) -> Rows:
@@ -99,7 +100,7 @@ def _rows(motion: Motion, times: Array) -> Rows:
 
 def _offsets(motion: Motion, times: Array, centres: Array, interval: float) -> Array:
     """How far a body is from the middle of each panel, to the right and up [m], shape (columns, 2); NaN after its last state."""
-    away = motion.frames.position[_rows(motion, times)] - centres
+    away = np.stack([np.interp(times, motion.frames.t, column) for column in motion.frames.position.T], axis=1) - centres
     is_over = motion.frames.t[-1] <= times - interval
     return np.where(is_over[:, None], np.nan, np.stack([away @ RIGHT, away @ UP], axis=1))
 

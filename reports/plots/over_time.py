@@ -20,9 +20,11 @@ if TYPE_CHECKING:
 Quantity = Callable[[Scenario, Trajectory], Array]
 
 RESOLVED, MOST_MISSED = 0.05, 0.1
-"""Straight lines between the drawn points do not resolve a curve where they differ from it by more than this share of its range. A curve is
-drawn as an envelope if a tenth of it is not resolved. An impact affects only one point.
+"""Straight lines between the drawn points do not resolve a curve where they differ from it by more than this share of its range there. A
+curve is drawn as an envelope if it is not resolved for a tenth of its time. An impact affects only one point.
 """
+NEARBY, HARDLY_SEEN = 16, 0.2
+"""Drawn points over which the range is taken, and its least value, relative to that of the whole curve: a late oscillation may be small."""
 POINTS_A_TURN = 32
 MOST_SAMPLES = 200_000
 
@@ -93,7 +95,9 @@ def plot_over_time(results: Results, scene_name: str, quantity: Quantity, axes: 
 
 
 def _sampled(truth: Truth, times: Array, end: float) -> Trajectory:
-    """The exact solution at these times up to its end, and at as many times between them as are needed to resolve every turn."""
+    """The exact solution at these times up to its end, at and half-way between events, and at as many times as every turn needs."""
+    events = np.array([event.time for event in truth.events])
+    times = np.unique(np.concatenate([times, events, 0.5 * (events[1:] + events[:-1])]))
     coarse = truth(times[times <= end])
     fastest = float(np.linalg.norm(coarse.angular_velocity, axis=1).max(initial=0.0))
     turned = angle_between_orientations(coarse.orientation[:-1], coarse.orientation[1:]).max(initial=0.0)
@@ -110,9 +114,12 @@ def _drawn(line: Line, times: Array) -> Line:
     x, y = line.x[shown], line.y[shown]
     finite = np.isfinite(line.y)
     reach = float(np.ptp(line.y[finite])) if finite.any() else 0.0
-    missed = np.abs(np.interp(line.x, x, y) - line.y)[finite] > RESOLVED * reach
+    parts = shown[::NEARBY]
+    ranges = np.fmax.reduceat(line.y, parts) - np.fmin.reduceat(line.y, parts)
+    nearby = np.repeat(np.clip(ranges, HARDLY_SEEN * reach, reach), np.diff(parts, append=len(line.y)))
+    missed = (np.abs(np.interp(line.x, x, y) - line.y) > RESOLVED * nearby)[finite]
     constant = reach <= FLAT * float(np.abs(line.y[finite]).max(initial=0.0))
-    if constant or not finite.any() or missed.mean() <= MOST_MISSED:
+    if constant or not finite.any() or missed @ np.gradient(line.x)[finite] <= MOST_MISSED * (line.x[-1] - line.x[0]):
         return replace(line, x=x, y=y)
     low, high = (extreme.reduceat(line.y, shown) for extreme in (np.fmin, np.fmax))  # without NaN, as far as there is a number
     return replace(line, x=x, y=0.5 * (low + high), marker="", is_sparse=False, low=low, high=high, is_fill=True)

@@ -23,7 +23,7 @@ MOST_FRAMES = 300
 IN_SIGHT = 10.0
 """The extent of the view, as a multiple of the extent of the motion that stays nearest to the start."""
 MOST_TURNS = 1e6
-"""Upper bound on whole turns between two frames: a diverging engine may report any angular velocity."""
+"""Upper bound on whole turns of a step, or between two frames: a diverging engine may report any angular velocity."""
 RESOLVED_HOP = 4.0
 """Number of time steps: an impulse below that of the weight during this time is no impact. In some engines a resting body hops for a step
 or two.
@@ -52,6 +52,7 @@ class Motion:
         label: Label of the engine, or what the reference is: an exact solution or a recording.
         colour: Colour of the engine; empty for the reference, which is drawn in the text colour.
         frames: States at a fixed stride, and those at impacts, from the start to the last finite one.
+        rotations: Sum of the rotations of all steps from each frame to the next, as rotation vectors [rad], shape (frames - 1, 3).
         errors: Distance [m] and angle [rad] from the reference at each frame, shape (frames, 2), NaN after its end; None without one.
         impacts: The impacts on the floor and on walls, in order.
     """
@@ -59,17 +60,35 @@ class Motion:
     label: str
     colour: str
     frames: Trajectory
+    rotations: Array
     errors: Array | None
     impacts: Impacts
 
     @cached_property
-    @np.errstate(over="ignore")  # an engine may return 1e300
     def turns(self) -> NDArray[np.intp]:
-        """Whole turns from each frame to the next in addition to the shorter rotation, by the angular velocity; shape (frames - 1,)."""
-        axes, angles = axis_and_angle(multiply(self.frames.orientation[1:], conjugate(self.frames.orientation[:-1])))
-        spins = 0.5 * (self.frames.angular_velocity[1:] + self.frames.angular_velocity[:-1])
-        turns = (dot(spins, axes) * np.diff(self.frames.t) - angles) / (2.0 * np.pi)
-        return np.rint(np.clip(turns, -MOST_TURNS, MOST_TURNS)).astype(np.intp)
+        """Whole turns from each frame to the next in addition to the shorter rotation, shape (frames - 1,)."""
+        return _turns(self.rotations, *_shorter_rotations(self.frames)).astype(np.intp)
+
+
+@np.errstate(over="ignore")  # an engine may return 1e300
+def rotations_of_steps(motion: Trajectory) -> Array:
+    """The rotation vectors between successive states [rad], shape (n - 1, 3), with as many whole turns as the angular velocity says.
+
+    An engine whose orientation does not follow its angular velocity turns by another angle, which may add up to turns in several steps.
+    """
+    spins = 0.5 * (motion.angular_velocity[1:] + motion.angular_velocity[:-1])
+    axes, angles = _shorter_rotations(motion)
+    return axes * (angles + 2.0 * np.pi * _turns(spins * np.diff(motion.t)[:, None], axes, angles))[:, None]
+
+
+def _shorter_rotations(motion: Trajectory) -> tuple[Array, Array]:
+    """Axes and angles, at most half a turn, of the rotations between successive states."""
+    return axis_and_angle(multiply(motion.orientation[1:], conjugate(motion.orientation[:-1])))
+
+
+def _turns(rotations: Array, axes: Array, angles: Array) -> Array:
+    """Numbers of whole turns by which rotation vectors exceed shorter rotations."""
+    return np.rint(np.clip((dot(rotations, axes) - angles) / (2.0 * np.pi), -MOST_TURNS, MOST_TURNS))
 
 
 def axis_and_angle(rotation: Array) -> tuple[Array, Array]:
@@ -141,10 +160,13 @@ def replay_of(results: Results, scene_name: str, dt: float | None = None) -> Rep
 
 def replay_together(scene: Scenario, dt: float, moved: Mapping[str, Trajectory]) -> Replay:
     """Motions of a scene at a time step [s], by their labels, and the exact solution or the recording if there is one."""
-    every, truth, styles = _stride(scene.steps(dt)), reference_for(scene), engine_styles(tuple(moved))
-    motions = [_motion(scene, truth, label, styles[label].colour, motion, every) for label, motion in moved.items()]
+    steps, truth, styles = scene.steps(dt), reference_for(scene), engine_styles(tuple(moved))
+    every = _stride(steps)
+    first_event = [round(event.time / dt) for event in truth.events[:1]] if truth else []
+    shown = np.union1d(np.arange(0, steps + 1, every), first_event).astype(np.intp)
+    motions = [_motion(scene, truth, label, styles[label].colour, motion, shown) for label, motion in moved.items()]
     if truth is not None:
-        motions.append(_exact_motion(scene, truth, dt * every * np.arange(scene.steps(dt) // every + 1, dtype=np.float64)))
+        motions.append(_exact_motion(scene, truth, dt * shown.astype(np.float64)))
     return Replay(scene, dt, dt * every, [motion for motion in motions if len(motion.frames) > 1])
 
 
@@ -157,9 +179,9 @@ def _stride(steps: int) -> int:
     return next((every for every in range(least, 2 * least + 1) if steps % every == 0), least)
 
 
-def _motion(scene: Scenario, truth: Truth | None, label: str, colour: str, motion: Trajectory, every: int) -> Motion:
+def _motion(scene: Scenario, truth: Truth | None, label: str, colour: str, motion: Trajectory, rows: Rows) -> Motion:
     motion = motion[: motion.first_bad_row] if motion.first_bad_row is not None else motion
-    rows = np.arange(0, len(motion), every)
+    rows = rows[rows < len(motion)]
     impacts = Impacts(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
     if scene.floor is not None and len(motion) > 1:
         before, after, main = impact_rows(scene, motion)
@@ -167,18 +189,19 @@ def _motion(scene: Scenario, truth: Truth | None, label: str, colour: str, motio
         # A body bounces between two states: interpolated over a longer time, it would turn back above the floor.
         rows = np.union1d(rows, np.concatenate([main - 1, main]))
     frames = motion[rows]
-    return Motion(label, colour, frames, None if truth is None else _errors(frames, exactly(truth, frames.t)), impacts)
+    rotations = np.add.reduceat(rotations_of_steps(motion[: rows[-1] + 1]), rows[:-1]) if len(rows) > 1 else np.empty((0, 3))
+    return Motion(label, colour, frames, rotations, None if truth is None else _errors(frames, exactly(truth, frames.t)), impacts)
 
 
 def _exact_motion(scene: Scenario, truth: Truth, times: Array) -> Motion:
     times = np.union1d(times, [event.time for event in truth.events])
     states = np.array([[event.before, event.after] for event in truth.events]).reshape(-1, 13)
     pairs = Trajectory.from_states(np.repeat([event.time for event in truth.events], 2), states)
-    before = (
-        np.flatnonzero(np.any(states[::2, RATES] != states[1::2, RATES], axis=1)) * 2
-    )  # a change of friction is an event, but no impact
+    # A change of friction is an event, but no impact.
+    before = 2 * np.flatnonzero(np.any(states[::2, RATES] != states[1::2, RATES], axis=1))
     impacts = Impacts(pairs.t[before], *contact_impulses(scene, pairs, before, before + 1))
-    return Motion(truth.word, "", exactly(truth, times), None, impacts)
+    frames = exactly(truth, times)
+    return Motion(truth.word, "", frames, rotations_of_steps(frames), None, impacts)
 
 
 def _errors(motion: Trajectory, exact: Trajectory) -> Array:

@@ -33,6 +33,20 @@ def test_moments_are_around_the_impact_and_the_engine_that_is_exact_covers_the_o
     assert shown.shows_impact
 
 
+def test_impact_of_a_long_motion_is_drawn_when_it_occurs():
+    """Frames are 0.2 s apart; the ball strikes the floor at √(2/9.8) = 0.452 s, and both motions have the state at the nearest step."""
+    scene = ds.load("bounce-95")
+    times = 5e-3 * np.arange(scene.steps(5e-3) + 1)
+    shown = strip_of(replay_together(scene, 5e-3, {"mujoco": ds.Trajectory.from_states(times, ds.truth_for(scene).states(times))}))
+    assert shown.moments[1] == "impact, 0.45 s"
+    [(_, _, path)] = shown.rows
+    drawn = [
+        np.array([list(map(float, re.findall(r"-?[\d.]+", one)[:2])) for one in re.findall("M[^Ma]+a", each)])
+        for each in (path, shown.exact)
+    ]
+    np.testing.assert_allclose(*drawn, atol=2.0)
+
+
 def test_body_is_drawn_where_it_is_and_an_arrow_points_to_one_outside():
     """Moved up by 0.3 of its size the body is higher by that much of its drawn size; from ten sizes on there is an arrow alone."""
     scene = ds.load("fall-spin")

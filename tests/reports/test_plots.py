@@ -236,6 +236,17 @@ def test_a_spin_too_fast_to_draw_is_an_envelope():
     np.testing.assert_allclose(exact.low[:-1], (up @ axis) * axis[1] - across, atol=0.02 * across)
 
 
+def test_small_late_bounces_too_fast_to_draw_are_an_envelope():
+    """3 % of the range, for 40 s of 60 s: points 0.15 s apart would show bounces of 0.156 s as ones of 6 s."""
+    scene = ds.load("bounce-95")
+    exact = exactly(scene)
+    position, late = exact.position.copy(), exact.t > 20.0
+    position[late, 1] = 0.1 + 0.03 * np.abs(np.sin(np.pi * exact.t[late] / 0.156))
+    chart = plots.over_time(made(scene, replace(exact, position=position)), scene.name, plots.height)
+    assert [one.is_fill for one in chart.lines] == [True, False]
+    assert np.ptp(chart.lines[0].high[200:-1]) < 1e-3
+
+
 def test_rounding_errors_of_a_constant_are_not_magnified():
     """The energy of a free spin is constant: the axis reaches a tenth of its value up and down."""
     scene = ds.load("spin-principal")

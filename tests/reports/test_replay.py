@@ -68,6 +68,19 @@ def test_interpolation_between_frames_follows_the_angular_velocity():
             assert angle_between_orientations(q, expected) < (1e-9 if motion.label == EXACT else 0.05)
 
 
+def test_body_turns_as_its_states_do_and_not_as_its_angular_velocity_says():
+    """States 4 ms apart turn by 1.6 rad, which an angular velocity of 500 rad/s does not show; nor do frames 40 ms apart."""
+    scene = ds.load("spin-principal-500")
+    axis, angles = np.array(scene.start.angular_velocity) / 500.0, 1.6 * np.arange(scene.steps(4e-3) + 1)
+    states = np.tile(scene.initial_state, (len(angles), 1))
+    states[:, 3:7] = multiply(about(axis, angles), np.array(scene.start.orientation))
+    motion, _ = replay_together(scene, 4e-3, {"slow": Trajectory.from_states(4e-3 * np.arange(len(angles)), states)}).motions
+    assert motion.frames.t[1] == pytest.approx(0.04)
+    for frame in (0, 7, 100):
+        expected = multiply(about(axis, 4.0), motion.frames.orientation[frame])
+        assert angle_between_orientations(a_quarter_later(motion, frame), expected) < 1e-9
+
+
 def test_last_state_is_a_frame():
     """For every number of steps that has a suitable divisor."""
     for steps in (150, 375, 2500, 1750, 10_000):

@@ -12,7 +12,7 @@ from support.frames import a_quarter_later
 import dropspin as ds
 from dropspin.reports.replay import Replay, as_data, replay_of
 from dropspin.reports.replay.data import quantised
-from dropspin.reports.replay.motions import MOST_FRAMES, Impacts, Motion
+from dropspin.reports.replay.motions import MOST_FRAMES, Impacts, Motion, rotations_of_steps
 from dropspin.scenarios import Trajectory, truth_for
 from dropspin.scenarios.rotations import about, angle_between_orientations
 
@@ -82,9 +82,8 @@ def test_turns_between_frames_are_counted_from_the_rounded_attitudes():
     states[:, 3:7] = about(np.array([0.6, 0.0, 0.8]), angle * np.arange(101))
     states[:, 10:] = angle / 0.01 * np.array([0.6, 0.0, 0.8])
     scene = ds.load("spin-principal-500").model_copy(update={"duration": 1.0})
-    motion = Motion(
-        "an-engine", "#123456", Trajectory.from_states(t, states), None, Impacts(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
-    )
+    frames, none = Trajectory.from_states(t, states), Impacts(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
+    motion = Motion("an-engine", "#123456", frames, rotations_of_steps(frames), None, none)
     [data] = as_data(Replay(scene, 0.01, 0.01, [motion]))["motions"]
     q = shown(data, 0.01)[2]
     rounded = replace(motion, frames=replace(motion.frames, orientation=q))

@@ -226,7 +226,7 @@ def _rows(label: str, found: Mapping[str, Array]) -> Iterator[Error]:
     values, floor = found["as given"], found["drawn starts"]
     lower, upper = intervals_of_means(values)
     for kind, of_kind, drawn, *ends in zip(KINDS, values.T, floor.T, lower, upper, strict=True):
-        low, high = interval_of_share(of_kind) if kind.quantity == "resting face" else ends
+        low, high = interval_of_share(of_kind) if kind.quantity == "same resting face" else ends
         tosses = int(np.isfinite(of_kind).sum())
         yield Error(label, *kind, _mean(of_kind), _mean(drawn), float(np.maximum(low, 0.0)), float(high), tosses)
 

@@ -37,10 +37,10 @@ KINDS = (
     *(Kind("orientation", at, "rad") for at in TIMES),
     Kind("energy", "mean", "1"),
     Kind("rest time", "end", "s"),
-    Kind("resting face", "end", "1"),
+    Kind("same resting face", "end", "1"),
 )
-"""Of these the resting face is no error, but whether it is the same, 1 or 0. A motion that does not rest at the end of the record counts as
-resting then, so that the error of the rest time may be larger."""
+"""Of these "same resting face" is no error, but whether it is the same, 1 or 0. A motion that does not rest at the end of the record counts
+as resting then, so that the error of the rest time may be larger."""
 
 
 def body_length(body: Body) -> float:

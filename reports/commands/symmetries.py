@@ -49,4 +49,4 @@ def symmetries_command(scenes: tuple[str, ...], dt: float, output: str, json_out
             page = symmetries_page(worst, {scene.name: scene for scene in loaded}, dt)
             (folder / "symmetries.html").write_text(page, encoding="utf-8")
     if worst and not json_output:
-        echo(f"Replay of the worst case of each engine: {os.path.join(output, 'symmetries.html')}")
+        echo(f"Replay of the worst lost symmetry of each engine: {os.path.join(output, 'symmetries.html')}")

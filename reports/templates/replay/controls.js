@@ -67,11 +67,11 @@
       });
     }
 
-    // Values are those of the nearest state of the run: no interpolation.
+    // The height is that of the body as drawn; the errors are those of the nearest frame.
     update(time) {
       this.viewer.motions.forEach((motion, i) => {
         const { cells, swatch } = this.rows[i], row = motion.nearest(time), held = motion.held(time);
-        const texts = [motion.position[row][1].toFixed(3)];
+        const texts = [motion.at(time).position[1].toFixed(3)];
         if (this.viewer.exact) texts.push(...[0, 1].map((k) => (motion.errors.length && !Number.isNaN(motion.errors[k][row]) ? rounded(motion.errors[k][row]) : "–")));
         if (this.viewer.hasFloor) texts.push(held ? `${rounded(held.size, 3)} at ${held.time.toFixed(3)} s` : "–");
         if (motion.hasEnded(time)) texts.fill("–").splice(0, 1, `ended at ${motion.end.toFixed(3)} s`);

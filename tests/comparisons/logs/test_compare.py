@@ -73,7 +73,7 @@ def test_error_of_the_engine_that_made_the_tosses_is_its_noise_floor(comparison)
     for kind in (("position", "mean"), ("orientation", "impact"), ("orientation", "mean"), ("energy", "mean")):
         assert own[kind].lower < own[kind].noise_floor < own[kind].upper, kind
     assert dead["position", "mean"].value > 4.0 * own["position", "mean"].value
-    assert of(comparison.errors, engine=WANG, quantity="resting face").value == 1.0
+    assert of(comparison.errors, engine=WANG, quantity="same resting face").value == 1.0
 
 
 def test_noise_floor_of_exact_starts_is_the_noise_of_a_frame():
@@ -130,7 +130,7 @@ def test_planted_errors_measure_as_themselves():
         assert planted["position", at] == pytest.approx(0.01 / size)
         assert planted["orientation", at] == pytest.approx(0.1)
     assert planted["energy", "mean"] == pytest.approx(0.0, abs=1e-12)
-    assert planted["resting face", "end"].all()
+    assert planted["same resting face", "end"].all()
     assert late["rest time", "end"] == pytest.approx(0.1)
 
 

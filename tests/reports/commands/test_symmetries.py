@@ -25,7 +25,7 @@ def test_table_sentences_and_files(tmp_path):
     assert "✓ kept up to rounding" in done.stdout
     assert lines[-2:] == [
         "Written: out/symmetries/symmetries.md",
-        "Replay of the worst case of each engine: out/symmetries/symmetries.html",
+        "Replay of the worst lost symmetry of each engine: out/symmetries/symmetries.html",
     ]
     folder = tmp_path / "out/symmetries"
     assert {path.name for path in folder.iterdir()} == {"section.json", *(f"symmetries.{kind}" for kind in ("csv", "html", "json", "md"))}

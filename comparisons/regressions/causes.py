@@ -147,8 +147,10 @@ def _with(parameter: Parameter, size: float) -> FaultModel:
 
 @lru_cache(maxsize=32)  # many faults of what is reported simulate the same scene
 def _exact(scene: Scenario, step: float, count: int, start: float) -> Trajectory | None:
+    """The exact solution at equally spaced times; None if it ends before the second one."""
     truth = truth_for(scene)
-    return None if truth is None else exactly(truth, step * (start + np.arange(count, dtype=float)))
+    motion = None if truth is None else exactly(truth, step * (start + np.arange(count, dtype=float)))
+    return None if motion is None or len(motion) < 2 else motion
 
 
 class _Caused(NamedTuple):

@@ -233,3 +233,20 @@ def test_fault_is_found_beside_a_body_for_which_it_is_impossible():
 
     results = run([load({"name": "plain", **spin, "body": body}), displaced], Made(title="solid", change=as_solid), STEPS)
     assert "inertia is that of the solid shape for every scene" in [fault.message for fault in causes(results, "solid").faults]
+
+
+def test_cause_with_which_the_exact_solution_ends_at_once_explains_nothing():
+    """A box that starts just above the floor would be below it if it were twice as large."""
+    turned = [-0.42504026148056717, 0.10642986962035506, 0.8305845078704521, 0.34371912117123177]
+    spin = [0.22763970144050116, 0.3568204760763351, 0.15517512976495293]
+    scene = load(
+        {
+            "duration": 2.0,
+            "body": {"shape": "box", "mass": 1.0, "half_extents": [0.13575393696063415, 0.17184731602586736, 0.12686801406673318]},
+            "start": {"position": [0.0, 0.4379931077872551, 0.0], "orientation": turned, "angular_velocity": spin},
+            "gravity": {"acceleration": [0.0, -5.095086225478851, 0.0]},
+            "floor": {"restitution": 0.0018427941945932558, "friction": "none"},
+        }
+    )
+    [twice] = [fault for fault in mistakes.FAULT_MODELS if fault.message.startswith("the body is twice as large")]
+    assert np.isnan(_caused(scene, twice, 2e-3).error("energy_drift"))

@@ -27,12 +27,9 @@ class Parameter(NamedTuple):
 
 
 def _scaled(table: str, name: str, scene: Scenario, share: float) -> Scenario:
-    """A number of a table times 1 + share, also beyond the values that a scene may have."""
-    old = getattr(scene, table)
-    value = getattr(old, name, None)
-    if not value or isinstance(value, str):
-        return scene
-    return scene.model_copy(update={table: old.model_copy(update={name: (1.0 + share) * value})})
+    """A number of a table times 1 + share; there is no exact solution with a restitution above 1."""
+    value = getattr(getattr(scene, table), name, None)
+    return scene if not value or isinstance(value, str) else with_values(scene, table, **{name: (1.0 + share) * value})
 
 
 def _gravity(change: Callable[[Array, float], Array]) -> Change:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 
-from dropspin.comparisons.engines.options import calibrated_label
+from dropspin.comparisons.engines.options import calibrated_label, parts_of
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS, Outcome, with_reason
@@ -91,6 +91,8 @@ class ProfileComparison(NamedTuple):
         parts = [row["part"] for row in self.rows]
         most = sum(part > 0.5 for part in parts)
         are = "is mostly a setting error" if most == 1 else "are mostly setting errors"
+        if parts_of(self.calibrated)[1]:  # an option may be a setting that errs
+            are = f"{'is' if most == 1 else 'are'} mostly due to settings other than those given"
         return (
             f"{in_sentence(self.engine)}: {most} of its {counted(len(parts), 'error')} above {SMALLEST_STATED:g} "
             f"at the finest time step {are} (median share of the settings in an error: {100 * statistics.median(parts):.1f} %)."

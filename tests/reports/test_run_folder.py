@@ -27,7 +27,7 @@ from dropspin.reports.plots import run_charts
 from dropspin.reports.plots.run_charts import report_charts
 from dropspin.reports.replay import replay_of
 from dropspin.reports.run_folder import write_report
-from dropspin.reports.stories.findings import profile_comparisons
+from dropspin.reports.stories.findings import ProfileComparison, profile_comparisons
 from dropspin.reports.stories.matrix import MEANINGS
 from dropspin.reports.stories.numbers import formatted
 from dropspin.reports.stories.run import document, overview
@@ -447,6 +447,17 @@ def test_setting_errors_are_compared_with_the_calibrated_profile():
     assert "Setting errors of" in page
     assert comparison.sentence in overview(found).conclusion
     assert profile_comparisons(run("drop-ball", "pybullet[profile=default]", 1e-2)) == []
+
+
+def test_setting_that_is_given_in_both_profiles_is_no_setting_error_of_the_default_one():
+    """An option that makes the whole error is in the calibrated engine too."""
+    row = {"part": 0.0}
+    sentences = [
+        ProfileComparison(f"pybullet[{options}profile=default]", f"pybullet{calibrated}", [row, row]).sentence
+        for options, calibrated in (("", ""), ("floor_restitution=0,", "[floor_restitution=0]"))
+    ]
+    assert "are mostly setting errors (median" in sentences[0]
+    assert "are mostly due to settings other than those given (median" in sentences[1]
 
 
 @pytest.mark.extended

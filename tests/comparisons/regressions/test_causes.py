@@ -250,3 +250,10 @@ def test_cause_with_which_the_exact_solution_ends_at_once_explains_nothing():
     )
     [twice] = [fault for fault in mistakes.FAULT_MODELS if fault.message.startswith("the body is twice as large")]
     assert np.isnan(_caused(scene, twice, 2e-3).error("energy_drift"))
+
+
+def test_restitution_above_1_is_no_cause():
+    """Its exact solution would be that of none."""
+    elastic = with_values(load("drop-ball"), "floor", restitution=1.0)
+    assert np.isnan(_caused(elastic, _with(PARAMETERS[0], 1e-3), 2e-3).error("bounce_height_error"))
+    assert _caused(elastic, _with(PARAMETERS[0], -1e-3), 2e-3).error("bounce_height_error") == pytest.approx(-2e-3, rel=0.01)

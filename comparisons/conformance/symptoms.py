@@ -45,6 +45,8 @@ def symptoms(probe: Probe, motion: Trajectory) -> Iterator[str]:
         return
     elif probe.scene.gravity is None:
         yield from _of_flight(probe.scene, rows[probe.rows], exact)
+    elif probe.scene.damping is None:
+        yield from _of_fall(probe, motion)
     for (name, unit), error, allowed in zip(QUANTITIES, differences(rows[probe.rows], exact), probe.allowed, strict=True):
         if not error <= allowed:
             yield f"{name} is off by {error:.{min(digits_that_differ(error, allowed), 4)}g} {unit} (allowed: {allowed:g} {unit})"
@@ -76,6 +78,16 @@ def _of_flight(scene: Scenario, states: Array, exact_states: Array) -> Iterator[
             if off <= CLEAR * float(np.linalg.norm(exact[part])) * scene.duration:
                 why, beside = "", f", beside {'positions' if quantity == 'speed' else 'attitudes'} that are right"
             yield f"{why}the final {quantity} is {instead(final, expected, unit)}{beside}"
+
+
+def _of_fall(probe: Probe, motion: Trajectory) -> Iterator[str]:
+    """The acceleration of a fall, if both velocities and positions show that it is wrong."""
+    right, time, start = probe.scene.acceleration, motion.t[-1], motion.velocity[0]
+    by_velocity = (motion.velocity[-1] - start) / time
+    by_position = 2.0 * (motion.position[-1] - motion.position[0] - time * start) / time**2
+    size, expected = float(np.linalg.norm(by_velocity)), float(np.linalg.norm(right))
+    if abs(size - expected) * time > probe.allowed[2] and (by_velocity - right) @ (by_position - right) > 0.0:
+        yield f"the acceleration is {instead(size, expected, 'm/s²')}"
 
 
 def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:

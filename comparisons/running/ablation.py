@@ -25,18 +25,23 @@ ENOUGH = 0.9
 NOTEWORTHY = 1e-3
 """Least share that is stated."""
 MOST = 0.5
-"""Share of a change that reverting settings takes away, at least: it is known roughly, from few starts."""
+"""Share of a change that reverting settings takes away, at least: it is known roughly, from few starts; and of an error that is partly
+explained.
+"""
 ADDITIVE = 0.02
 """Largest difference between the share of two settings and the sum of theirs where each has its own."""
 
 
-def shares(error: Callable[[Reverted], float], changed: Sequence[str], change: float = 0.0) -> dict[tuple[str, ...], float]:
+def shares(
+    error: Callable[[Reverted], float], changed: Sequence[str], change: float = 0.0, *, partly: bool = False
+) -> dict[tuple[str, ...], float]:
     """The settings that explain an error.
 
     Args:
         error: The error with some settings reverted; NaN if it is undefined.
         changed: The names of all settings that were changed.
         change: A change of the error, of which reverting all of them takes most away if they explain it.
+        partly: Whether the setting that explains most of the error, and at least half, is named if no one or two explain nine tenths.
 
     Returns:
         The share of one setting, and that which a second one adds to it; or of two together, by both names, where their own shares do not
@@ -72,6 +77,9 @@ def shares(error: Callable[[Reverted], float], changed: Sequence[str], change: f
     pairs: list[tuple[str, ...]] = list(combinations(mattering, 2))
     most = max((explained(*pair) for pair in pairs), default=0.0)
     best = {pair: share(*pair) for pair in pairs if explained(*pair) >= max(ENOUGH, most - ADDITIVE)}
+    if partly and not best:
+        name = max(single, key=explained)
+        return {(name,): explained(name)} if explained(name) >= MOST else {}
     if len(best) == 1:
         [pair] = best
         of_each: dict[tuple[str, ...], float] = {(name,): single[name] for name in pair}
@@ -81,7 +89,7 @@ def shares(error: Callable[[Reverted], float], changed: Sequence[str], change: f
 
 
 def explaining(
-    engine: Engine, back: Mapping[str, str | None], error_of: Callable[[Engine], float], change: float = 0.0
+    engine: Engine, back: Mapping[str, str | None], error_of: Callable[[Engine], float], change: float = 0.0, *, partly: bool = False
 ) -> dict[str, float]:
     """The changed options of an engine that explain its error: `shares` by option and value, such as `linearDamping=0.04`.
 
@@ -90,6 +98,7 @@ def explaining(
         back: By the name of each, the value to which it is reverted; None if it is left out.
         error_of: The error of an engine; NaN if it is undefined.
         change: As of `shares`.
+        partly: As of `shares`.
     """
 
     def error(names: Reverted) -> float:
@@ -99,7 +108,7 @@ def explaining(
             return error_of(replace(left, options={**left.options, **reverted}))
         return math.nan
 
-    found = shares(error, list(back), change)
+    found = shares(error, list(back), change, partly=partly)
     return {", ".join(f"{name}={engine.options[name]}" for name in names): share for names, share in found.items()}
 
 

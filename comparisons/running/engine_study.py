@@ -180,7 +180,7 @@ class EngineStudy:
         if not changed or not abs(error_of(written.calibrated)) < 0.5 * sizes[metric.name] * scale(scene, metric.unit):
             return  # it is not the settings that err
         case = Case(scene.name, self.entry.label, dt, scene.steps(dt))
-        for settings, share in explaining(written, dict.fromkeys(changed), error_of).items():
+        for settings, share in explaining(written, dict.fromkeys(changed), error_of, partly=True).items():
             yield case.measurement("setting", metric.name, "1", Judgement(share, "measured"), settings)
 
     def error_of(self, metric: Metric, dt: float) -> Callable[[Engine], float]:

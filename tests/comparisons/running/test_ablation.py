@@ -84,14 +84,17 @@ def test_default_profile_is_the_calibrated_one_with_its_settings_written_out(nam
 
 
 def test_shares_of_known_functions():
-    def of(error, *changed):
-        return shares(lambda reverted: error(*(name not in reverted for name in changed)), changed)
+    def of(error, *changed, partly=False):
+        return shares(lambda reverted: error(*(name not in reverted for name in changed)), changed, partly=partly)
 
     assert of(lambda a, b, c: 0.7 * a + 0.3 * b + 0.0 * c, "a", "b", "c") == {("a",): pytest.approx(0.7), ("b",): pytest.approx(0.3)}
     assert of(lambda a, b: 0.95 * a + 0.05 * b, "a", "b") == {("a",): pytest.approx(0.95), ("b",): pytest.approx(0.05)}
     assert of(lambda a, b, c: a or b, "a", "b", "c") == {("a", "b"): 1.0}  # one hides the other
     assert of(lambda a, b, c: a and b, "a", "b", "c") == {("a",): 1.0, ("b",): 1.0}  # alternatives
-    assert of(lambda a, b, c: a + b + c, "a", "b", "c") == {}  # three
+    assert of(lambda a, b, c: a + b + c, "a", "b", "c", partly=True) == {}  # three
+    overshot = {("a",): pytest.approx(0.86)}  # without it, an error of the other sign is left
+    assert of(lambda a, *others: 1.14 * a - 0.035 * sum(others), *"abcde", partly=True) == overshot
+    assert of(lambda a, *others: 1.14 * a - 0.035 * sum(others), *"abcde") == {}
     assert of(lambda a, b: 1.0, "a", "b") == {}  # none of them
     assert of(lambda a, b: float("nan") if not a else 1.0, "a", "b") == {}  # it does not reach an end
 

@@ -4,6 +4,7 @@ What the file shows by itself, without the laws of motion, are facts: rows that 
 """
 
 import math
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from dropspin.comparisons.logs.formats import FORMATS, ORIENTATION, POSITION, SPIN, VELOCITY, read_columns
 from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
 from dropspin.comparisons.running.foreign_motions import is_uneven, missing_frames, problems_of_order
-from dropspin.scenarios.errors import DropspinError, UnknownName
+from dropspin.scenarios.errors import DropspinError, SceneWarning, UnknownName
 from dropspin.scenarios.loading import read_toml, with_mesh
 from dropspin.scenarios.rotations import conjugate, dot, length, multiply, rotate
 from dropspin.scenarios.state import Array
@@ -133,7 +134,8 @@ def load_log(recording: str | Path) -> Log:
             `toss-cube`.
 
     Returns:
-        The recording in SI units, with y up and quaternions [x, y, z, w] from body to world.
+        The recording in SI units, with y up and quaternions [x, y, z, w] from body to world. Python warns of moments of inertia that no
+        body of this mass and size has.
 
     Raises:
         DropspinError: A file is absent, damaged or too large, a key or a column is wrong, or the values are impossible for a recording.
@@ -145,6 +147,8 @@ def load_log(recording: str | Path) -> Log:
     if path.suffix.lower() in FORMATS:
         raise DropspinError(f"{given}: is the data of a recording; give its header, a TOML file with the keys data and [body].")
     header = validated(Header, given, with_mesh(read_toml(path, given, "recording"), path.parent))
+    if header.body.excess_inertia:
+        warnings.warn(f"{given}: body.inertia: {header.body.excess_inertia}", SceneWarning, stacklevel=2)
     columns, names = read_columns(path.parent / header.data, str(Path(given).parent / header.data), header.topic)
     header = header.model_copy(update={"data": str((path.parent / header.data).resolve())})
     where = f"{given}: data"

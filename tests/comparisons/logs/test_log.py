@@ -15,6 +15,7 @@ from dropspin.comparisons.logs import formats
 from dropspin.comparisons.logs.header import LENGTHS, TIMES
 from dropspin.comparisons.logs.log import load_log
 from dropspin.scenarios import DropspinError
+from dropspin.scenarios.errors import SceneWarning
 
 BODY = {"shape": "box", "half_extents": [0.05, 0.05, 0.05], "mass": 1.0}
 RATE, FRAMES = 100.0, 40
@@ -33,7 +34,7 @@ AXES = {  # the axes of the recording in the world with y up, as columns
 }
 
 
-def written(folder, columns, header=(), name="toss.csv"):
+def written(folder, columns, header=(), name="toss.csv", **body):
     """A header and its data, and the path of the header."""
     path = folder / name
     match path.suffix:
@@ -46,7 +47,7 @@ def written(folder, columns, header=(), name="toss.csv"):
             pq.write_table(pa.table(dict(columns)), path)
         case ".mcap":
             write_mcap(path, {"/pose": columns})
-    (folder / "toss.toml").write_text(tomlkit.dumps({"data": name, **dict(header), "body": BODY}))
+    (folder / "toss.toml").write_text(tomlkit.dumps({"data": name, **dict(header), "body": BODY | body}))
     return folder / "toss.toml"
 
 
@@ -377,3 +378,10 @@ def test_body_at_rest_in_rounded_rows_is_no_fact(tmp_path):
     still = {name: np.concatenate([values, np.full(100, values[-1])]) for name, values in POSE.items()}
     still |= {name: np.round(still[name], 3) for name in "xyz"} | {"t": np.arange(len(still["t"])) / RATE}
     assert load_log(written(tmp_path, still, {"rate": RATE})).irregularities == ()
+
+
+def test_impossible_inertia_of_a_header_is_warned_of(tmp_path):
+    """Ten times that of the solid; a shell of the same mass has up to three times as much."""
+    path = written(tmp_path, recorded("y"), inertia=[0.0167, 0.0167, 0.0167])
+    with pytest.warns(SceneWarning, match=r"^.*toss\.toml: body\.inertia: got .* needs mass outside of the body"):
+        load_log(path)

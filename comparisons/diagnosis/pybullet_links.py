@@ -124,7 +124,7 @@ class Link(NamedTuple):
             is_ball = len(self.geometry) == 1 and any(
                 bool(times) or math.isclose(self.dynamics[2][0], 0.4 * self.mass * r**2, rel_tol=SAME) for r in balls
             )
-            of = "the sphere" if is_ball else "the bounding box of the collision geometry"
+            of = "the sphere" if is_ball else "the bounding box of the collision geometry" if self.geometry else "a box of 2 mm"
             made = f"replaced by that of {of}{times}: {digits(self.dynamics[2])} kg m²"
             yield "inertia", next(self.element.every("inertia")).words, made
         for element in self.element.every(*OF_CONTACT):

@@ -166,14 +166,7 @@ def diagnose(
             raise DropspinError(f"{engine} does not read {ending} files; use {' or '.join(READERS[ending])}.")
     with tempfile.TemporaryDirectory() as folder:
         if ending in (".obj", ".stl"):
-            points, faces = read_mesh(path, given)
-            if why := openness(points, faces):
-                raise DropspinError(f"{given}: the mesh {why}, so that it has no volume; mend it, or give the body in an MJCF file.")
-            is_inside_out = np.linalg.det(points[faces]).sum() < 0.0  # of which MuJoCo refuses the exact volume
-            inertia_of = "legacy" if is_inside_out else "exact"
-            text = MESH.format(path=path.resolve(), inertia=inertia_of, name=path.stem, density=density, scale=scale)
-            path = Path(folder, "mesh.xml")
-            path.write_text(text, encoding="utf-8")
+            path = _model_of_mesh(path, given, Path(folder), density, scale)
         entries = list(map(present_entry, chosen))
         with started_crews(1, 1, entries, resources) as crews:
             read = [(entry, crews[0].call(entry, _bodies, path, given, wanted, loose)) for entry in entries]
@@ -200,6 +193,28 @@ def diagnose(
                 whys = (why if (why := body.breakdown).endswith(".") else f"{given}: {body.name}: {why}." for body in found)
                 raise DropspinError(" ".join(dict.fromkeys(whys)))
             return Diagnosis(given, tuple(found), next((one for one in others if isinstance(one, str)), ""))
+
+
+def _model_of_mesh(path: Path, given: str, folder: Path, density: float, scale: float) -> Path:
+    """An MJCF file in a folder with a body that is a mesh.
+
+    Raises:
+        DropspinError: The file is no mesh, or the mesh has no volume.
+    """
+    import trimesh  # takes half a second
+
+    points, faces = read_mesh(path, given)
+    if why := openness(points, faces):
+        raise DropspinError(f"{given}: the mesh {why}, so that it has no volume; mend it, or give the body in an MJCF file.")
+    mesh = path.resolve()
+    if path.suffix.lower() == ".stl":  # MuJoCo reads no text
+        mesh = folder / "mesh.stl"
+        trimesh.Trimesh(points, faces, process=False).export(mesh)
+    is_inside_out = np.linalg.det(points[faces]).sum() < 0.0  # of which MuJoCo refuses the exact volume
+    inertia_of = "legacy" if is_inside_out else "exact"
+    model = folder / "mesh.xml"
+    model.write_text(MESH.format(path=mesh, inertia=inertia_of, name=path.stem, density=density, scale=scale), encoding="utf-8")
+    return model
 
 
 def _refusals(given: str, read: Sequence[tuple[EngineEntry, list[str] | DropspinError | Breakdown]]) -> list[BodyDiagnosis]:

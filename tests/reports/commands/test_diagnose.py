@@ -5,9 +5,12 @@ import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from support.cli import dropspin
+from trimesh import Trimesh
+from trimesh.exchange.stl import export_stl_ascii
 
 DOCS = Path(__file__).parents[3] / "docs"
 WORLD = """<mujoco model="two"><worldbody><geom name="floor" type="plane" size="1 1 .1"/>
@@ -188,3 +191,12 @@ def test_engine_that_breaks_down_on_reading_a_file_is_named_beside_what_the_othe
     said = " ".join((done.stdout if code == 3 else done.stderr).split())
     assert f"{file}: cannot be read with pybullet: RuntimeError: no mesh." in said
     assert ("b: box, 1 kg; MuJoCo" if code == 3 else f"{file}: MuJoCo does not compile it: ") in said
+
+
+def test_mesh_in_text_is_read(tmp_path, monkeypatch):
+    """MuJoCo reads binary STL files alone."""
+    corners = np.array([(0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.05, 0.0), (0.0, 0.0, 0.02)])
+    faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    (tmp_path / "part.stl").write_text(export_stl_ascii(Trimesh(corners, faces)))
+    monkeypatch.setattr("dropspin.comparisons.diagnosis.study.QUESTIONS", ())
+    assert dropspin("diagnose", "part.stl", cwd=tmp_path, COLUMNS="200").stdout.startswith("part: mesh, 0.01667 kg;")

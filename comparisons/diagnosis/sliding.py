@@ -149,7 +149,7 @@ def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         kept.append(last / first if rolls else 0.0)
         exact.append(float(spin_about_axis(1.0, first, heavy, 0.0, *drag)) / first if rolls else 0.0)
     is_off_joint = body.offset.any() and (body.armature or any(drag))  # which act at the body's origin
-    if body.rolling and abs(kept[0] - 1.0) > NOTEWORTHY:
+    if (body.rolling or body.falls.cubic) and abs(kept[0] - 1.0) > NOTEWORTHY:
         acting = (*body.unknown, *["damping"] * any(body.falls), *body.rolling)
         return [replace(answer, measured=kept[0], findings=(Finding("setting", acting),))]
     if body.rolling or not body.friction or body.falls.cubic or is_off_joint:

@@ -151,6 +151,15 @@ def test_rolling_friction_that_slows_a_ball_is_named_and_removed(tmp_path, floor
     assert other.friction == 1.0
 
 
+def test_damping_in_three_powers_that_slows_a_rolling_ball_is_named(tmp_path):
+    """No closed form says how much; without it, the ball rolls on."""
+    joint = '<joint type="free" damping=".01 .01 .01"/><geom size=".05" mass=".3"/>'
+    [(answer, finding)] = findings_of(body_of(tmp_path, f'<body name="b" pos="0 0 .2">{joint}</body>'), roll)
+    assert answer.measured < 0.01
+    assert (finding.kind, finding.settings) == ("setting", ("damping",))
+    assert finding.remedies[0].value == pytest.approx(1.0, abs=1e-3)
+
+
 def test_slides_of_a_body_that_does_not_rest_have_no_number(tmp_path):
     """At 2 ms the contact throws the box up; at 0.5 ms it rests, and slides as far as Coulomb's law says."""
     geom = '<geom type="box" size=".05 .05 .02" mass="1" friction="0.2" priority="1" solref="0.004 0.2"/>'

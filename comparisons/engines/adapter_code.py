@@ -3,27 +3,37 @@
 import ast
 import hashlib
 import inspect
+import os
+import re
 import sys
 import sysconfig
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import cache
+from glob import glob
 from importlib.util import find_spec, resolve_name
 from itertools import accumulate
 from pathlib import Path
 
+from dropspin.comparisons.engines.base import Engine, EngineBroken
 from dropspin.comparisons.engines.program_engine import ProgramEngine
+from dropspin.scenarios.validation import shown
 
 PACKAGE, COMMON = "dropspin.comparisons.engines", frozenset({"base", "options", "packages", "settings"})
-INSTALLED = frozenset({"site-packages", "dist-packages"})
-LIBRARIES = frozenset({".so", ".dylib", ".dll", ".pyd"})
+INSTALLED = frozenset({"site-packages", "dist-packages", "node_modules"})
+LIBRARIES = re.compile(r".+\.(so(\.\d+)*|dylib|dll|pyd)", re.IGNORECASE)
+SCRIPTS = re.compile(rf"{LIBRARIES.pattern}|.+\.(py|js|mjs|cjs|ts|wasm|jar|class|jl|lua|m|pl|r|rb|sh)", re.IGNORECASE)
+"""What a program may load beside libraries; data are left out, because a run may write them."""
+MOST_ENTRIES, MOST_BYTES = 100_000, 2**30
+"""Of files and folders that are searched, and of the files that are hashed: they take about a second."""
 STANDARD = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib"))
 
 
-def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
+def adapter_code(adapter: type[Engine], loaded: Iterable[str] = ()) -> str | None:
     """A short hash of an adapter's file and of every module that it loads, outside the standard library and installed packages.
 
-    The shared libraries in the folder of the adapter's file belong to it, and the files in the command of a `ProgramEngine`.
+    The files in the command of a `ProgramEngine` belong to it, and the adapter's `code_files`: by default the shared libraries in and below
+    the folder of its file, and those scripts if it is a `ProgramEngine`.
 
     The modules are those that the files import, in functions too; modules that are imported by a computed name are found only in `loaded`.
 
@@ -33,6 +43,9 @@ def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
 
     Returns:
         The hash; None for a class that is not in a file.
+
+    Raises:
+        EngineBroken: A file of `code_files` does not exist, or by default there are too many files to search or to read.
     """
     try:
         file = Path(inspect.getfile(adapter)).resolve()
@@ -42,9 +55,39 @@ def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
         return built_in_code(file)
     files = _with_imports({file: adapter.__module__}, _file)
     further = {other: name for name in loaded if (other := _file(name)) is not None and other not in files}
-    compiled = [] if INSTALLED.intersection(file.parts) else [path for path in file.parent.iterdir() if path.suffix in LIBRARIES]
-    compiled += map(Path, adapter.command()) if issubclass(adapter, ProgramEngine) else []
-    return hash_of({*files, *_with_imports(further, _file), *filter(Path.is_file, compiled)})
+    command = map(Path, adapter.command()) if issubclass(adapter, ProgramEngine) else ()
+    return hash_of({*files, *_with_imports(further, _file), *_code_files(adapter, file.parent), *filter(Path.is_file, command)})
+
+
+def _code_files(adapter: type[Engine], folder: Path) -> Iterable[Path]:
+    """The files of `code_files`, by default libraries and scripts in and below a folder."""
+    if adapter.code_files is None:
+        return [] if INSTALLED.intersection(folder.parts) else _below(folder, SCRIPTS if issubclass(adapter, ProgramEngine) else LIBRARIES)
+    if isinstance(adapter.code_files, str):
+        raise EngineBroken(f'{adapter.__name__}.code_files is {shown(adapter.code_files)}; give a sequence, such as ("../build/*.so",).')
+    found: list[Path] = []
+    for pattern in adapter.code_files:
+        files = [folder / path for path in glob(pattern, root_dir=folder, recursive=True) if (folder / path).is_file()]
+        if not files:
+            raise EngineBroken(f"{adapter.__name__}.code_files: no file {shown(pattern)} in {folder}; paths are relative to this folder.")
+        found += files
+    return (path.resolve() for path in found)
+
+
+def _below(folder: Path, wanted: re.Pattern[str]) -> list[Path]:
+    """The files with such names in and below a folder, not in hidden folders or in those of installed packages."""
+    found: list[Path] = []
+    entries = size = 0
+    for here, folders, names in os.walk(folder):
+        folders[:] = [name for name in folders if not name.startswith(".") and name not in INSTALLED]
+        own = [path for path in (Path(here, name).resolve() for name in names if wanted.fullmatch(name)) if os.access(path, os.R_OK)]
+        found += filter(Path.is_file, own)
+        entries, size = entries + len(folders) + len(names), size + sum(path.stat().st_size for path in own)
+        if entries > MOST_ENTRIES or size > MOST_BYTES:
+            much = f"{MOST_ENTRIES} files and folders" if entries > MOST_ENTRIES else f"{MOST_BYTES >> 20} MiB of libraries and scripts"
+            remedy = "put it into a folder of its own, or name in its `code_files` the files that it loads (docs/bring-your-engine.md)"
+            raise EngineBroken(f"{folder}, the folder of an engine's adapter, has more than {much}, any of which it may load; {remedy}.")
+    return found
 
 
 def built_in_code(file: Path) -> str:
@@ -64,7 +107,7 @@ def built_in_code(file: Path) -> str:
 
 def hash_of(files: Iterable[Path]) -> str:
     """A short hash of the content of files, in the order of their names."""
-    return hashlib.sha256(b"".join(one.read_bytes() for one in sorted(files, key=lambda path: path.name))).hexdigest()[:12]
+    return hashlib.sha256(b"".join(one.read_bytes() for one in sorted(files, key=lambda path: (path.name, path)))).hexdigest()[:12]
 
 
 def _with_imports(files: Mapping[Path, str], file_of: Callable[[str], Path | None]) -> dict[Path, str]:

@@ -97,6 +97,12 @@ class Engine(Configured, ABC):
     mixes_scenes: ClassVar[bool] = False
     """Whether the scenes of a batch may differ in all numbers (masses, sizes, gravity, floors), not only in their initial states."""
 
+    code_files: ClassVar[Sequence[str] | None] = None
+    """The files that the engine loads beside Python modules, as paths or patterns (`**` is any folder) relative to the adapter's folder.
+
+    If one of them changes, it is another engine. None for the shared libraries in and below that folder, and scripts of a `ProgramEngine`.
+    """
+
     @property
     def reasons(self) -> Mapping[str, str]:
         """For each setting in `Simulation.settings` with a calibrated value, the reason for this value."""

@@ -55,20 +55,37 @@ class ProgramEngine(Engine):
         """
         if isinstance(cls.program, str) or not cls.program:
             raise TypeError(f'`program` is {shown(cls.program)}; give the command and its arguments, such as ("./solver",)')
-        folder = Path(inspect.getfile(cls)).resolve().parent
+        folder = cls._folder()
         return [str(folder / part) if (folder / part).is_file() else part for part in cls.program]
 
+    @classmethod
+    def _folder(cls) -> Path:
+        return Path(inspect.getfile(cls)).resolve().parent
+
+    @classmethod
+    def _stated(cls) -> str:
+        """The command for the settings, which `check` compares with those of other checkouts: no path begins with a folder of this one."""
+        folder = cls._folder()
+
+        def stated(part: str) -> str:
+            path = Path(part)
+            if path.is_relative_to(folder):
+                return str(path.relative_to(folder))
+            return path.name if path.is_file() else part
+
+        return " ".join(map(stated, cls.command()))
+
     def prepare(self, scene: Scenario, dt: float) -> "ProgramSimulation":
-        return ProgramSimulation(scene, dt, self.command(), self.lag * dt)
+        return ProgramSimulation(scene, dt, self.command(), self._stated(), self.lag * dt)
 
 
 class ProgramSimulation(Simulation):
     """A process of the program, for one scene."""
 
-    def __init__(self, scene: Scenario, dt: float, command: Sequence[str], velocity_lag: float) -> None:
+    def __init__(self, scene: Scenario, dt: float, command: Sequence[str], stated: str, velocity_lag: float) -> None:
         self.velocity_lag = velocity_lag
         files = [Path(part).read_bytes() for part in command if Path(part).is_file()]
-        self.settings = {"program": " ".join(command), "version": hashlib.sha256(b"".join(files)).hexdigest()[:12]}
+        self.settings = {"program": stated, "version": hashlib.sha256(b"".join(files)).hexdigest()[:12]}
         with ExitStack() as opened:
             self._errors = opened.enter_context(TemporaryFile())
             try:

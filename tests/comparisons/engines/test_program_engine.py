@@ -118,6 +118,23 @@ def test_engine_of_which_a_file_changed_is_another_engine(tmp_path, name):
     verify_changes_with(adapter_in(tmp_path), tmp_path / name)
 
 
+@pytest.mark.parametrize("absolute", [False, True])
+def test_settings_of_a_program_are_the_same_in_another_folder(tmp_path, absolute):
+    """A baseline is checked in another checkout, where its settings are not the cause of a change."""
+    found = []
+    for folder in (tmp_path / "a", tmp_path / "b"):
+        (folder / "lib").mkdir(parents=True)
+        shutil.copy(DOCS / "course" / "solver.py", folder)
+        script = folder / "lib" / "program.py"
+        script.write_text(LOOP.format("print(line[6:].strip())"))
+        adapter = adapter_in(folder)
+        adapter.program = (sys.executable, "-u", "-W", "ignore::x/y", str(script) if absolute else "./lib/program.py")
+        with adapter().prepare(SPIN, 0.01) as simulation:
+            found.append(simulation.settings)
+    assert found[0] == found[1]
+    assert found[0]["program"] == f"{Path(sys.executable).name} -u -W ignore::x/y lib/program.py"
+
+
 @pytest.mark.parametrize("stated", [{}, {"lag": 0.0}])
 def test_lag_of_a_program_is_what_its_class_states(stated):
     """By default that of Algorithm 1."""

@@ -6,9 +6,12 @@ steps, and for the state after them. A state is a line of 13 numbers. The progra
 
 import hashlib
 import inspect
+import os
+import shutil
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, suppress
+from functools import cache
 from pathlib import Path
 from select import select
 from signal import Signals
@@ -48,7 +51,7 @@ class ProgramEngine(Engine):
 
     @classmethod
     def command(cls) -> list[str]:
-        """`program`, with the paths of files in the folder of the class's module.
+        """`program`, with the paths of files in the folder of the class's module, and that of a command on the system's search path.
 
         Raises:
             TypeError: `program` is not a sequence of strings.
@@ -56,7 +59,8 @@ class ProgramEngine(Engine):
         if isinstance(cls.program, str) or not cls.program:
             raise TypeError(f'`program` is {shown(cls.program)}; give the command and its arguments, such as ("./solver",)')
         folder = cls._folder()
-        return [str(folder / part) if (folder / part).is_file() else part for part in cls.program]
+        first, *others = [str(folder / part) if (folder / part).is_file() else part for part in cls.program]
+        return [shutil.which(first) or first, *others]
 
     @classmethod
     def _folder(cls) -> Path:
@@ -68,12 +72,12 @@ class ProgramEngine(Engine):
         folder = cls._folder()
 
         def stated(part: str) -> str:
-            path = Path(part)
-            if path.is_relative_to(folder):
-                return str(path.relative_to(folder))
-            return path.name if path.is_file() else part
+            path = folder / part
+            if not path.is_file():
+                return part
+            return str(path.relative_to(folder)) if path.is_relative_to(folder) else path.name
 
-        return " ".join(map(stated, cls.command()))
+        return " ".join(map(stated, cls.program))
 
     def prepare(self, scene: Scenario, dt: float) -> "ProgramSimulation":
         return ProgramSimulation(scene, dt, self.command(), self._stated(), self.lag * dt)
@@ -84,8 +88,9 @@ class ProgramSimulation(Simulation):
 
     def __init__(self, scene: Scenario, dt: float, command: Sequence[str], stated: str, velocity_lag: float) -> None:
         self.velocity_lag = velocity_lag
-        files = [Path(part).read_bytes() for part in command if Path(part).is_file()]
-        self.settings = {"program": stated, "version": hashlib.sha256(b"".join(files)).hexdigest()[:12]}
+        files = [(part, os.stat(part)) for part in command if Path(part).is_file()]
+        version = _hash(tuple((part, found.st_mtime_ns, found.st_size) for part, found in files))
+        self.settings = {"program": stated} | ({"version": version} if files else {})
         with ExitStack() as opened:
             self._errors = opened.enter_context(TemporaryFile())
             try:
@@ -152,6 +157,12 @@ class ProgramSimulation(Simulation):
         lines = self._errors.read().decode(errors="replace").splitlines()
         how = f"ended with {Signals(-code).name if code < 0 else f'exit code {code}'}"
         return how + (f" and the last line {shown(lines[-1])}" if lines else "")
+
+
+@cache
+def _hash(files: tuple[tuple[str, int, int], ...]) -> str:
+    """A short hash of the content of files with times of change and sizes: an interpreter of 100 MB is not read for each simulation."""
+    return hashlib.sha256(b"".join(Path(path).read_bytes() for path, _, _ in files)).hexdigest()[:12]
 
 
 def scene_lines(scene: Scenario, dt: float) -> Iterator[str]:

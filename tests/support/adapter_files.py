@@ -7,6 +7,7 @@ def code_with(adapter, file, content):
     """The hash of an adapter with a file of some content, which is the same each time."""
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(content)
+    file.chmod(0o755)
     found = adapter_code(adapter)
     assert adapter_code(adapter) == found
     return found

@@ -1,5 +1,6 @@
 """Programs as engines: the documented one in C compared with `wang`, and programs that end, are silent, or answer with something else."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -116,6 +117,22 @@ def test_engine_of_which_a_file_changed_is_another_engine(tmp_path, name):
     """A run that was interrupted is not resumed with it. The adapter names the program `solver`, which may load scripts."""
     shutil.copy(DOCS / "course" / "solver.py", tmp_path)
     verify_changes_with(adapter_in(tmp_path), tmp_path / name)
+
+
+def test_program_on_the_search_path_is_identified_by_its_file(tmp_path, monkeypatch):
+    """Its version is not that of every other program, and another file of the name is another engine."""
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"), prepend=os.pathsep)
+    shutil.copy(DOCS / "course" / "solver.py", tmp_path)
+    engine, file, versions = adapter_in(tmp_path), tmp_path / "bin" / "my-solver", []
+    engine.program = ("my-solver",)
+    verify_changes_with(engine, file)
+    for comment in ("a", "b", "a"):
+        file.write_text(f"#!{sys.executable} -u\n# {comment}\n{LOOP.format('print(line[6:].strip())')}")
+        file.chmod(0o755)
+        with engine().prepare(SPIN, 0.01) as simulation:
+            assert simulation.settings["program"] == "my-solver"
+            versions.append(simulation.settings["version"])
+    assert versions[0] == versions[2] != versions[1]
 
 
 @pytest.mark.parametrize("absolute", [False, True])

@@ -10,6 +10,7 @@ from dropspin.comparisons.conformance.motions import check_motion
 from dropspin.comparisons.conformance.outcomes import OUTCOMES, CheckOutcome, CheckResult, described, whole_traceback
 from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.engines.base import Diverged, Engine
+from dropspin.comparisons.engines.exceptions import TimedOut
 from dropspin.comparisons.running.arguments import EngineEntry, ignore
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_entries import present_entry
@@ -137,6 +138,8 @@ def run_check(entry: EngineEntry, check: str, folder: str | None = None) -> Chec
         return CheckResult(check, "passed", CHECKS[check](entry.adapter))
     except tuple(OUTCOMES) as ended:
         return CheckResult(check, OUTCOMES[type(ended)], str(ended), whole_traceback(ended) if ended.__cause__ else "")
+    except TimedOut as late:
+        return CheckResult(check, "timed_out", str(late))
     except Diverged as diverged:
         return CheckResult(check, "failed", f"the engine diverged: {diverged}")
     except Exception as error:  # an adapter is somebody else's code

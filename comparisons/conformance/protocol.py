@@ -16,6 +16,7 @@ from dropspin.comparisons.conformance.motions import explain_start
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted, described
 from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, FLIGHTS, PROBES, accepted_scene, recorded, state_after
 from dropspin.comparisons.engines.base import Diverged, Engine, Simulation
+from dropspin.comparisons.engines.exceptions import TimedOut
 from dropspin.comparisons.running.adapter_output import (
     MULTIPLE,
     BuildMismatch,
@@ -77,7 +78,7 @@ def check_builds(engine: Engine) -> str:
             read_back.append(_verify_built(engine, scene))
         except (CheckFailed, BuildMismatch) as wrong:
             raise CheckFailed(f"{wrong} (in the scene {scene.name})") from None
-        except Diverged:
+        except (Diverged, TimedOut):
             raise
         except Exception as error:  # an adapter is somebody else's code
             raise CheckFailed(

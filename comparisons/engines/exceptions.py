@@ -1,8 +1,12 @@
-"""An exception of an adapter as text: its own text may be anything, or raise."""
+"""An exception of an adapter as text, which may be anything, or raise; and the exception that an engine's time is up."""
 
 from dropspin.scenarios.text import printable
 
 LONGEST = 1000
+
+
+class TimedOut(Exception):
+    """Raised if an engine does not answer in time; the message says what was asked, and how long it may take."""
 
 
 def described(error: BaseException) -> str:

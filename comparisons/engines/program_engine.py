@@ -22,6 +22,7 @@ from typing import ClassVar
 import numpy as np
 
 from dropspin.comparisons.engines.base import Array, Engine, Simulation
+from dropspin.comparisons.engines.exceptions import TimedOut
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.text import counted
 from dropspin.scenarios.validation import shown
@@ -126,7 +127,7 @@ class ProgramSimulation(Simulation):
         while b"\n" not in self._unread:
             written = self._written(max(0.0, end - time.monotonic()))
             if written is None:
-                raise RuntimeError(f"the program did not answer {asked!r} within {patience:g} s; does it flush its output?")
+                raise TimedOut(f"the program did not answer {asked!r} within {patience:g} s; does it flush its output?")
             if not written:
                 raise RuntimeError(f"the program {self._end()} instead of answering {asked!r}")
             self._unread += written

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dropspin.comparisons.engines.base import Diverged, Engine, KnownLimitation
-from dropspin.comparisons.engines.exceptions import described, short
+from dropspin.comparisons.engines.exceptions import TimedOut, described, short
 from dropspin.comparisons.engines.registry import engine as engine_named
 from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.running.adapter_output import (
@@ -179,8 +179,11 @@ def classify(error: BaseException) -> Breakdown:
     """The verdict for what an adapter raised: an engine is somebody else's code, so any exception costs its own row only."""
     if isinstance(error, Breakdown):
         return error.with_traceback(None)
-    reason = short(str(error)) if isinstance(error, Diverged | BuildMismatch) else described(error)
-    return Breakdown("diverged" if isinstance(error, Diverged) else "crashed", reason)
+    verdicts: dict[type[BaseException], Verdict] = {Diverged: "diverged", TimedOut: "timed_out", BuildMismatch: "crashed"}
+    for kind, verdict in verdicts.items():
+        if isinstance(error, kind):
+            return Breakdown(verdict, short(str(error)))
+    return Breakdown("crashed", described(error))
 
 
 def finite(recording: Recording | Breakdown) -> Trajectory:

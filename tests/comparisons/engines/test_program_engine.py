@@ -13,7 +13,7 @@ import pytest
 from support.adapter_files import verify_changes_with
 
 import dropspin as ds
-from dropspin.comparisons.conformance.checks import run_check
+from dropspin.comparisons.conformance.checks import conform, run_check
 from dropspin.comparisons.engines import program_engine
 from dropspin.comparisons.engines.program_engine import scene_lines
 from dropspin.comparisons.running.arguments import EngineEntry
@@ -103,13 +103,25 @@ def test_program_that_does_not_answer_is_ended(monkeypatch):
     """It waits for its input, and dropspin for its answer, as when that stays in a buffer."""
     monkeypatch.setattr(program_engine, "PATIENCE", 1.0)
     found = try_record(python("pass"), SPIN, 0.01)
-    assert found.reason == "RuntimeError: the program did not answer 'start' within 1 s; does it flush its output?"
+    assert (found.verdict, found.reason) == ("timed_out", "the program did not answer 'start' within 1 s; does it flush its output?")
+
+
+def test_program_that_does_not_flush_is_waited_for_in_two_checks(monkeypatch):
+    """It is the mistake of a beginner, who gets an answer after a few seconds: the other checks are not run."""
+    monkeypatch.setattr(program_engine, "PATIENCE", 0.5)
+    found = {one.check: one for one in conform(python("print(line[6:].strip()) if word == 'advance' else 0"))}
+    late = [
+        name for name, one in found.items() if one.message == "the program did not answer 'start' within 0.5 s; does it flush its output?"
+    ]
+    assert late == ["compilation", "builds what is meant"]
+    assert {found[name].outcome for name in late} == {"timed_out"}
+    assert found["waiting"].message.startswith("not run, because compilation and builds what is meant used up their time")
 
 
 def test_program_that_writes_its_answer_slowly_has_the_time_of_an_answer_for_all_of_it(monkeypatch):
     monkeypatch.setattr(program_engine, "PATIENCE", 1.0)
     found = try_record(python("[(print('1', end=' '), time.sleep(0.3)) for _ in range(20)]"), SPIN, 0.01)
-    assert found.reason.startswith("RuntimeError: the program did not answer 'start' within 1 s")
+    assert found.reason.startswith("the program did not answer 'start' within 1 s")
 
 
 @pytest.mark.parametrize("name", ["solver", "lib/engine.js"])

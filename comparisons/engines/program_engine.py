@@ -6,6 +6,7 @@ steps, and for the state after them. A state is a line of 13 numbers. The progra
 
 import hashlib
 import inspect
+import math
 import os
 import shutil
 import time
@@ -32,6 +33,13 @@ PATIENCE, PATIENCE_OF_A_STEP = 10.0, 1.0
 
 A program that keeps its answer in a buffer waits for the next request, and dropspin for the answer.
 """
+_most_patience = [math.inf]
+"""The wall time that an answer may take in any case [s]."""
+
+
+def limit_patience(seconds: float) -> None:
+    """Wait for an answer of a program at most so long, in this process [s]."""
+    _most_patience[:] = [seconds]
 
 
 class ProgramEngine(Engine):
@@ -123,11 +131,12 @@ class ProgramSimulation(Simulation):
             raise RuntimeError(f"the program wrote {shown(self._unread.decode(errors='replace'))} before {asked!r}; an answer is one line")
         with suppress(BrokenPipeError):  # the program ended, so that there is no answer
             requests.write(f"{lines}\n".encode())
+        patience, most = min(patience, *_most_patience), "" if patience < _most_patience[0] else ", the time limit"
         end = time.monotonic() + patience
         while b"\n" not in self._unread:
             written = self._written(max(0.0, end - time.monotonic()))
             if written is None:
-                raise TimedOut(f"the program did not answer {asked!r} within {patience:g} s; does it flush its output?")
+                raise TimedOut(f"the program did not answer {asked!r} within {patience:g} s{most}; does it flush its output?")
             if not written:
                 raise RuntimeError(f"the program {self._end()} instead of answering {asked!r}")
             self._unread += written

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from dropspin.comparisons.engines.adapter_code import adapter_code
+from dropspin.comparisons.engines.program_engine import limit_patience
 from dropspin.comparisons.engines.registry import constructed
 from dropspin.comparisons.engines.stand_in import StandIn
 from dropspin.comparisons.running.arguments import EngineEntry
@@ -68,6 +69,7 @@ def memory_for_data(process: int) -> int:
 
 def call(work: Callable[..., Any], given: Sequence[Any], processor_time: float) -> Any:
     """Call a function with this process's engine, within a limit of processor time [s]; what it or the construction raises is returned."""
+    limit_patience(processor_time)
     _shared[0][0] = os.getpgrp() if hasattr(os, "getpgrp") else os.getpid()  # not a child that the engine forked
     if sys.platform == "linux":
         import resource

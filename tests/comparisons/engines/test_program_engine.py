@@ -18,6 +18,8 @@ from dropspin.comparisons.engines import program_engine
 from dropspin.comparisons.engines.program_engine import scene_lines
 from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, divergence, try_record
+from dropspin.comparisons.running.process_limits import ResourceLimits
+from dropspin.comparisons.running.processes import EngineProcesses
 
 DOCS = Path(__file__).parents[3] / "docs"
 SPIN, TUMBLE = ds.load("fall-spin"), ds.load("drop-box-tumble")
@@ -122,6 +124,16 @@ def test_program_that_writes_its_answer_slowly_has_the_time_of_an_answer_for_all
     monkeypatch.setattr(program_engine, "PATIENCE", 1.0)
     found = try_record(python("[(print('1', end=' '), time.sleep(0.3)) for _ in range(20)]"), SPIN, 0.01)
     assert found.reason.startswith("the program did not answer 'start' within 1 s")
+
+
+@pytest.mark.usefixtures("engine_processes")
+def test_program_that_hangs_is_waited_for_as_long_as_the_time_limit_says():
+    """Not for a second for each of its hundreds of steps, which in a run is much longer than that of all other engines."""
+    hanging = python("print(line[6:].strip()) if word == 'start' else time.sleep(1000)")
+    with EngineProcesses(ResourceLimits(processor_time=1.0)) as processes:
+        found = processes.call(EngineEntry(hanging.label, hanging), run_check, "coasting")
+    reason = "the program did not answer 'advance 1' within 1 s, the time limit; does it flush its output?"
+    assert (found.outcome, found.message) == ("timed_out", reason)
 
 
 @pytest.mark.parametrize("name", ["solver", "lib/engine.js"])

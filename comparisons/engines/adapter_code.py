@@ -55,8 +55,8 @@ def adapter_code(adapter: type[Engine], loaded: Iterable[str] = ()) -> str | Non
         return built_in_code(file)
     files = _with_imports({file: adapter.__module__}, _file)
     further = {other: name for name in loaded if (other := _file(name)) is not None and other not in files}
-    command = map(Path, adapter.command()) if issubclass(adapter, ProgramEngine) else ()
-    return hash_of({*files, *_with_imports(further, _file), *_code_files(adapter, file.parent), *filter(Path.is_file, command)})
+    command = filter(os.path.isfile, adapter.command()) if issubclass(adapter, ProgramEngine) else ()
+    return hash_of({*files, *_with_imports(further, _file), *_code_files(adapter, file.parent), *map(Path, command)})
 
 
 def _code_files(adapter: type[Engine], folder: Path) -> Iterable[Path]:

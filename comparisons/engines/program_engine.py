@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, suppress
 from functools import cache
+from os.path import isfile  # of a part that cannot be a path, too, such as a script that is an argument
 from pathlib import Path
 from select import select
 from signal import Signals
@@ -68,7 +69,7 @@ class ProgramEngine(Engine):
         if isinstance(cls.program, str) or not cls.program:
             raise TypeError(f'`program` is {shown(cls.program)}; give the command and its arguments, such as ("./solver",)')
         folder = cls._folder()
-        first, *others = [str(folder / part) if (folder / part).is_file() else part for part in cls.program]
+        first, *others = [str(folder / part) if isfile(folder / part) else part for part in cls.program]
         return [shutil.which(first) or first, *others]
 
     @classmethod
@@ -82,7 +83,7 @@ class ProgramEngine(Engine):
 
         def stated(part: str) -> str:
             path = folder / part
-            if not path.is_file():
+            if not isfile(path):
                 return part
             return str(path.relative_to(folder)) if path.is_relative_to(folder) else path.name
 
@@ -97,7 +98,7 @@ class ProgramSimulation(Simulation):
 
     def __init__(self, scene: Scenario, dt: float, command: Sequence[str], stated: str, velocity_lag: float) -> None:
         self.velocity_lag = velocity_lag
-        files = [(part, os.stat(part)) for part in command if Path(part).is_file()]
+        files = [(part, os.stat(part)) for part in command if isfile(part)]
         version = _hash(tuple((part, found.st_mtime_ns, found.st_size) for part, found in files))
         self.settings = {"program": stated} | ({"version": version} if files else {})
         with ExitStack() as opened:

@@ -15,6 +15,7 @@ from support.adapter_files import verify_changes_with
 import dropspin as ds
 from dropspin.comparisons.conformance.checks import conform, run_check
 from dropspin.comparisons.engines import program_engine
+from dropspin.comparisons.engines.adapter_code import adapter_code
 from dropspin.comparisons.engines.program_engine import scene_lines
 from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, divergence, try_record
@@ -174,6 +175,15 @@ def test_settings_of_a_program_are_the_same_in_another_folder(tmp_path, absolute
             found.append(simulation.settings)
     assert found[0] == found[1]
     assert found[0]["program"] == f"{Path(sys.executable).name} -u -W ignore::x/y lib/program.py"
+
+
+def test_argument_of_a_program_may_be_longer_than_a_path(tmp_path):
+    shutil.copy(DOCS / "course" / "solver.py", tmp_path)
+    adapter = adapter_in(tmp_path)
+    adapter.program = (sys.executable, "-u", "-c", LOOP.format("print(line[6:].strip())") + "#" * 300)
+    assert adapter_code(adapter) is not None
+    with adapter().prepare(SPIN, 0.01) as simulation:
+        assert simulation.settings["program"].endswith("###")
 
 
 @pytest.mark.parametrize("stated", [{}, {"lag": 0.0}])

@@ -34,6 +34,8 @@ PATIENCE, PATIENCE_OF_A_STEP = 10.0, 1.0
 
 A program that keeps its answer in a buffer waits for the next request, and dropspin for the answer.
 """
+POLL = 0.2
+"""Between looks at whether the program has ended [s]."""
 _most_patience = [math.inf]
 """The wall time that an answer may take in any case [s]."""
 
@@ -135,8 +137,11 @@ class ProgramSimulation(Simulation):
         patience, most = min(patience, *_most_patience), "" if patience < _most_patience[0] else ", the time limit"
         end = time.monotonic() + patience
         while b"\n" not in self._unread:
-            written = self._written(max(0.0, end - time.monotonic()))
-            if written is None:
+            has_ended = self._process.poll() is not None  # its children may hold its output open
+            written = self._written(0.0 if has_ended else max(0.0, min(POLL, end - time.monotonic())))
+            if written is None and not has_ended:
+                if time.monotonic() < end:
+                    continue
                 raise TimedOut(f"the program did not answer {asked!r} within {patience:g} s{most}; does it flush its output?")
             if not written:
                 raise RuntimeError(f"the program {self._end()} instead of answering {asked!r}")

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
@@ -100,6 +101,22 @@ def test_program_that_ends_between_requests_says_how():
         simulation._process.wait()
         with pytest.raises(RuntimeError, match="ended with exit code 3 instead of answering 'advance 1'"):
             simulation.advance(1)
+
+
+@pytest.mark.parametrize(("last", "reason"), [("", "ended with exit code 1 instead of answering 'advance 1'"), (STATE, None)])
+def test_program_that_ends_before_a_child_that_it_forked_is_not_waited_for(last, reason):
+    """The child holds the output open. What the program wrote before its end is read."""
+    code = f"os.write(1, (line[6:] if word == 'start' else {last!r} + '\\n' * {bool(last)}).encode())\n"
+    code += "    if word == 'advance' and os.fork(): os._exit(1)\n    if word == 'advance': time.sleep(8)"
+    start = time.monotonic()
+    with python(code).prepare(SPIN, 0.01) as simulation:
+        if reason is None:
+            simulation.advance(1)
+            assert simulation.state()[6] == 1.0
+        else:
+            with pytest.raises(RuntimeError, match=reason):
+                simulation.advance(1)
+        assert time.monotonic() < start + 7.0  # instead of 8 s
 
 
 def test_program_that_does_not_answer_is_ended(monkeypatch):

@@ -9,6 +9,7 @@ import inspect
 import math
 import os
 import shutil
+import signal
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, suppress
@@ -144,7 +145,10 @@ class ProgramSimulation(Simulation):
                     continue
                 raise TimedOut(f"the program did not answer {asked!r} within {patience:g} s{most}; does it flush its output?")
             if not written:
-                raise RuntimeError(f"the program {self._end()} instead of answering {asked!r}")
+                end_of_program = self._end()
+                if self._process.returncode == -signal.SIGXCPU:
+                    raise TimedOut(f"the program did not answer {asked!r} within the processor time that it may use, the time limit")
+                raise RuntimeError(f"the program {end_of_program} instead of answering {asked!r}")
             self._unread += written
         line, _, self._unread = self._unread.partition(b"\n")
         answer = line.decode(errors="replace").rstrip()

@@ -26,7 +26,7 @@ from dropspin.comparisons.running.processes import EngineProcesses
 DOCS = Path(__file__).parents[3] / "docs"
 SPIN, TUMBLE = ds.load("fall-spin"), ds.load("drop-box-tumble")
 STATE = "0 0 0 0 0 0 1 0 0 0 0 0 0"
-LOOP = "import os, sys, time\nfor line in sys.stdin:\n    word = line.split()[0]\n    if word in ('start', 'advance'): {}\n"
+LOOP = "import os, signal, sys, time\nfor line in sys.stdin:\n    word = line.split()[0]\n    if word in ('start', 'advance'): {}\n"
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +79,7 @@ def python(answer):
             r"the program ended with exit code 1 and the last line 'no such body' instead of answering 'start'",
         ),
         (python("os.kill(os.getpid(), 11)"), "crashed", "the program ended with SIGSEGV instead of answering 'start'"),
+        (python("os.kill(os.getpid(), signal.SIGXCPU)"), "timed_out", "did not answer 'start' within the processor time that it may use"),
         (python("print('hello')"), "crashed", "the program answered 'start' with 'hello', 1 word; a state is a line of 13 numbers"),
         (python("print(line[6:].strip() if word == 'start' else '1 2 3')"), "crashed", "the program answered 'advance 1' with '1 2 3'"),
         (python("print(line[6:].strip() if word == 'start' else 'nan ' * 13)"), "diverged", "the state is not finite"),

@@ -1,4 +1,6 @@
-"""An exception of an adapter as text, which may be anything, or raise; and the exception that an engine's time is up."""
+"""An exception of an adapter as text, which may be anything, or raise; how a process ended; the exception that an engine's time is up."""
+
+from signal import Signals
 
 from dropspin.scenarios.text import printable
 
@@ -23,3 +25,10 @@ def described(error: BaseException) -> str:
 def short(text: str) -> str:
     """A text in printable characters, at most 1,000."""
     return printable(text[:LONGEST])
+
+
+def ended_with(code: int) -> str:
+    """What ended a process, by the code that it returned: a signal, which has no name if it is one of real time, or an exit code."""
+    if code >= 0:
+        return f"exit code {code}"
+    return Signals(-code).name if -code in map(int, Signals) else f"signal {-code}"

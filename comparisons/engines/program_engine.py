@@ -17,7 +17,6 @@ from functools import cache
 from os.path import isfile  # of a part that cannot be a path, too, such as a script that is an argument
 from pathlib import Path
 from select import select
-from signal import Signals
 from subprocess import PIPE, Popen, TimeoutExpired
 from tempfile import TemporaryFile
 from typing import ClassVar
@@ -25,7 +24,7 @@ from typing import ClassVar
 import numpy as np
 
 from dropspin.comparisons.engines.base import Array, Engine, Simulation
-from dropspin.comparisons.engines.exceptions import TimedOut
+from dropspin.comparisons.engines.exceptions import TimedOut, ended_with
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.text import counted
 from dropspin.scenarios.validation import shown
@@ -175,8 +174,7 @@ class ProgramSimulation(Simulation):
             return "closed its output"
         self._errors.seek(0)
         lines = self._errors.read().decode(errors="replace").splitlines()
-        how = f"ended with {Signals(-code).name if code < 0 else f'exit code {code}'}"
-        return how + (f" and the last line {shown(lines[-1])}" if lines else "")
+        return f"ended with {ended_with(code)}" + (f" and the last line {shown(lines[-1])}" if lines else "")
 
 
 @cache

@@ -19,7 +19,7 @@ from typing import Self, TypeVar, TypeVarTuple
 
 from pebble import ProcessExpired, ProcessPool
 
-from dropspin.comparisons.engines.exceptions import described
+from dropspin.comparisons.engines.exceptions import described, ended_with
 from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.results.interrupts import finished, interrupts_deferred
 from dropspin.comparisons.running.arguments import EngineEntry, ignore
@@ -213,5 +213,5 @@ def _verdict(exit_code: int | None, allowed: float) -> tuple[Verdict, str]:
     if exit_code == -signal.SIGXCPU:
         return "timed_out", f"not done after {allowed:g} s of processor time"
     if exit_code is not None and exit_code < 0:
-        return "crashed", f"its process was ended by {signal.Signals(-exit_code).name}"
+        return "crashed", f"its process was ended by {ended_with(exit_code)}"
     return "crashed", f"its process ended with exit code {exit_code}"

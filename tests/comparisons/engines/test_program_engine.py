@@ -80,6 +80,7 @@ def python(answer):
         ),
         (python("os.kill(os.getpid(), 11)"), "crashed", "the program ended with SIGSEGV instead of answering 'start'"),
         (python("os.kill(os.getpid(), signal.SIGXCPU)"), "timed_out", "did not answer 'start' within the processor time that it may use"),
+        (python("os.kill(os.getpid(), signal.SIGRTMIN + 3)"), "crashed", "the program ended with signal 37 instead of answering 'start'"),
         (python("print('hello')"), "crashed", "the program answered 'start' with 'hello', 1 word; a state is a line of 13 numbers"),
         (python("print(line[6:].strip() if word == 'start' else '1 2 3')"), "crashed", "the program answered 'advance 1' with '1 2 3'"),
         (python("print(line[6:].strip() if word == 'start' else 'nan ' * 13)"), "diverged", "the state is not finite"),

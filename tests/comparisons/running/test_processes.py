@@ -70,6 +70,17 @@ def test_addresses_that_are_reserved_and_not_used_are_no_memory():
     assert not found["verdict"].isin(["crashed", "timed_out"]).any()
 
 
+def end_by_a_signal_without_a_name(entry):
+    os.kill(os.getpid(), signal.SIGRTMIN + 3)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGRTMIN"), reason="the system has no real-time signals")
+def test_signal_without_a_name_is_told_by_its_number():
+    with EngineProcesses(TIGHT) as processes:
+        found = processes.call(engine_entry(made.Exact()), end_by_a_signal_without_a_name)
+    assert (found.verdict, found.reason) == ("crashed", f"its process was ended by signal {signal.SIGRTMIN + 3}")
+
+
 def test_sleeping_engine_is_ended_by_the_wall_clock():
     """It uses no processor time; the wall time allowed is ten times the processor time."""
     found = ds.run([BALL], [breaking.breaking(breaking.sleep)], [4e-3], resources=ResourceLimits(processor_time=0.1)).table

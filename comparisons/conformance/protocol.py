@@ -16,7 +16,7 @@ from dropspin.comparisons.conformance.motions import explain_start
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted, described
 from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, FLIGHTS, PROBES, accepted_scene, recorded, state_after
 from dropspin.comparisons.engines.base import Diverged, Engine, Simulation
-from dropspin.comparisons.engines.exceptions import TimedOut
+from dropspin.comparisons.engines.exceptions import ProgramError, TimedOut
 from dropspin.comparisons.running.adapter_output import (
     MULTIPLE,
     BuildMismatch,
@@ -81,9 +81,8 @@ def check_builds(engine: Engine) -> str:
         except (Diverged, TimedOut):
             raise
         except Exception as error:  # an adapter is somebody else's code
-            raise CheckFailed(
-                f"{described(error, engine)}, in the scene {scene.name}; decline scenes that the engine cannot run, with a reason"
-            ) from error
+            remedy = "" if isinstance(error, ProgramError) else "; decline scenes that the engine cannot run, with a reason"
+            raise CheckFailed(f"{described(error, engine)}, in the scene {scene.name}{remedy}") from error
     if not read_back:
         raise Declined("the engine declines every scene")
     if not any(read_back):

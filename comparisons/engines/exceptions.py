@@ -1,10 +1,14 @@
-"""An exception of an adapter as text, which may be anything, or raise; how a process ended; the exception that an engine's time is up."""
+"""An exception of an adapter as text, which may be anything, or raise; how a process ended; and exceptions of engines."""
 
 from signal import Signals
 
 from dropspin.scenarios.text import printable
 
 LONGEST = 1000
+
+
+class ProgramError(RuntimeError):
+    """Raised if a program cannot be started, or answers with something else than a state, which has nothing to do with the scene."""
 
 
 class TimedOut(Exception):

@@ -24,7 +24,7 @@ from typing import ClassVar
 import numpy as np
 
 from dropspin.comparisons.engines.base import Array, Engine, Simulation
-from dropspin.comparisons.engines.exceptions import TimedOut, ended_with
+from dropspin.comparisons.engines.exceptions import ProgramError, TimedOut, ended_with
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.text import counted
 from dropspin.scenarios.validation import shown
@@ -108,7 +108,7 @@ class ProgramSimulation(Simulation):
             try:
                 self._process = opened.enter_context(Popen(command, bufsize=0, stdin=PIPE, stdout=PIPE, stderr=self._errors))
             except OSError as error:
-                raise RuntimeError(f"{command[0]!r} cannot be started: {error.strerror}; `program` is {list(command)}") from None
+                raise ProgramError(f"{command[0]!r} cannot be started: {error.strerror}; `program` is {list(command)}") from None
             opened.callback(self._process.kill)
             self._unread = b""
             self._state = self._ask("start", "\n".join(scene_lines(scene, dt)), PATIENCE)
@@ -131,7 +131,7 @@ class ProgramSimulation(Simulation):
         assert requests is not None
         self._unread += self._written(0.0) or b""
         if self._unread:  # which would be taken for the answer to this request
-            raise RuntimeError(f"the program wrote {shown(self._unread.decode(errors='replace'))} before {asked!r}; an answer is one line")
+            raise ProgramError(f"the program wrote {shown(self._unread.decode(errors='replace'))} before {asked!r}; an answer is one line")
         with suppress(BrokenPipeError):  # the program ended, so that there is no answer
             requests.write(f"{lines}\n".encode())
         patience, most = min(patience, *_most_patience), "" if patience < _most_patience[0] else ", the time limit"
@@ -157,7 +157,7 @@ class ProgramSimulation(Simulation):
             numbers = np.empty(0)
         if numbers.shape != (13,):
             found = f"{shown(answer)}, {counted(len(answer.split()), 'word')}"
-            raise RuntimeError(f"the program answered {asked!r} with {found}; a state is a line of 13 numbers")
+            raise ProgramError(f"the program answered {asked!r} with {found}; a state is a line of 13 numbers")
         return numbers
 
     def _written(self, patience: float) -> bytes | None:

@@ -98,6 +98,19 @@ def test_program_that_breaks_costs_its_row(engine, verdict, reason):
     assert re.search(reason, found.reason), found.reason
 
 
+@pytest.mark.parametrize(
+    ("answer", "remedy"),
+    [
+        ("print('hello')", "a state is a line of 13 numbers, in the scene tumbling"),
+        ("sys.exit('no body')", ", in the scene tumbling; decline scenes that the engine cannot run, with a reason"),
+    ],
+)
+def test_program_that_prints_text_is_not_told_to_decline_scenes(answer, remedy):
+    found = run_check(EngineEntry("program", python(answer)), "builds what is meant")
+    assert found.outcome == "failed"
+    assert found.message.endswith(remedy), found.message
+
+
 def test_program_that_ends_between_requests_says_how():
     with python("sys.stdout.write(line[6:]); sys.exit(3)").prepare(SPIN, 0.01) as simulation:
         simulation._process.wait()

@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Sequence
 from contextlib import chdir
 from functools import partial
+from itertools import product
 
 import numpy as np
 
@@ -138,8 +139,18 @@ def _start_explained(engine: Engine, scene: Scenario, state: Array) -> str:
     near = np.abs(state - scene.initial_state).max() <= single * np.abs(scene.initial_state).max()
     if engine.precision is np.float64 and near and np.array_equal(state, np.float32(state)):
         return "the state has single precision only; declare precision = numpy.float32, or pass the start on in double precision"
+    if digits := _decimal_rounding(scene, state):
+        return f"the start is rounded to {digits} digits; print states with 17 digits, as %.17g does"
     fault = explain_start(scene, state, single)
     return "" if fault is None else fault.message
+
+
+def _decimal_rounding(scene: Scenario, state: Array) -> int:
+    """The number of digits, after the point or significant, to which a program that prints text rounded the start; 0 if it did not."""
+    for digits, kind in product(range(3, 17), "fg"):
+        if np.array_equal(state, [float(f"{value:.{digits}{kind}}") for value in scene.initial_state]):
+            return digits
+    return 0
 
 
 def check_record(engine: Engine) -> str:

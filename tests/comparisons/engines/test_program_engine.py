@@ -111,6 +111,12 @@ def test_program_that_prints_text_is_not_told_to_decline_scenes(answer, remedy):
     assert found.message.endswith(remedy), found.message
 
 
+@pytest.mark.parametrize(("form", "digits"), [("%f", 6), ("%.12f", 12), ("%g", 6), ("%.9g", 9)])
+def test_program_that_prints_too_few_digits_is_told_so(form, digits):
+    found = run_check(EngineEntry("program", python(f"print(*({form!r} % float(n) for n in line.split()[1:]))")), "builds what is meant")
+    assert found.message == f"the start is rounded to {digits} digits; print states with 17 digits, as %.17g does (in the scene tumbling)"
+
+
 def test_program_that_ends_between_requests_says_how():
     with python("sys.stdout.write(line[6:]); sys.exit(3)").prepare(SPIN, 0.01) as simulation:
         simulation._process.wait()

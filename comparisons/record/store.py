@@ -94,7 +94,9 @@ class Record:
         )
 
     def write(self, engine: str, release: str, rows: Iterable[Row], common: Row) -> Path | None:
-        """Write the rows of a release, in the place of earlier ones of this machine; None if these failed for the same reason.
+        """Write the rows of a release, in the place of earlier ones of this machine.
+
+        None if these stay: they have results and the new rows have none, or both failed for the same reason.
 
         Args:
             engine: The engine.
@@ -107,7 +109,7 @@ class Record:
         for row in whole:
             row["profile"] = _profile(row["label"])
         earlier = [one for one in self.own(engine, release) if all(one[1][0][name] == whole[0][name] for name in MACHINE)]
-        if any([row["reason"] for row in rows] == [whole[0]["reason"]] and not whole[0]["label"] for _, rows in earlier):
+        if not whole[0]["label"] and any(rows[0]["label"] or rows[0]["reason"] == whole[0]["reason"] for _, rows in earlier):
             return None
         content = io.BytesIO()
         pq.write_table(pa.Table.from_pylist(whole, SCHEMA), content, compression="zstd", compression_level=19, store_schema=False)

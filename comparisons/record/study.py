@@ -72,10 +72,10 @@ def record(
         work = partial(_measured, plan, time_limit, stopping)
         try:
             for (engine, release), (rows, measured_on) in filter(None, as_done(workers, work, iter(pending), lambda: len(pending))):
-                record.write(engine, release, rows, common[engine] | measured_on)
+                stays = "" if record.write(engine, release, rows, common[engine] | measured_on) else "; the earlier file stays"
                 left -= 1
                 results = sum(bool(row.get("metric")) for row in rows)
-                on_done(f"{engine} {release}: {f'{results} results' if results else rows[0]['reason']}", left)
+                on_done(f"{engine} {release}: {f'{results} results' if results else rows[0]['reason']}{stays}", left)
         finally:
             if stopping is not None:
                 stopping.set()

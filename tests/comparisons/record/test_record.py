@@ -120,6 +120,17 @@ def test_a_release_that_fails_costs_its_own_row(stub, tmp_path):
     assert table(tmp_path)["verdict"].tolist() == ["measured", "broken", "measured"]
 
 
+def test_results_stay_where_a_release_can_no_longer_be_measured(stub, tmp_path):
+    """Its environment may fail another day, because the disk is full or a package has left the index."""
+    record(tmp_path)
+    before, said = files(tmp_path), []
+    stub.failures = {"1.1": Breakdown("missing", "not installable: no space left")}
+    changed = PLAN.model_copy(update={"dts": (0.02,)})
+    record(tmp_path, changed, chosen=["1.1"], on_done=lambda one, left: said.append(one))
+    assert files(tmp_path) == before
+    assert said == ["wang 1.1: not installable: no space left; the earlier file stays"]
+
+
 def test_workers_of_a_cluster_measure_with_their_own_machine_in_the_rows(stub, tmp_path, monkeypatch):
     """Workers are threads of this process, with the stub in place of pip; the record is the one of this machine."""
     distributed = pytest.importorskip("distributed")

@@ -22,7 +22,9 @@ QUANTITIES = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("ang
 CLEAR = 1e-3
 """Share of a speed, and ratio of a friction impulse, from which a difference is stated."""
 ALONG = 0.1
-"""Change of the direction of an angular momentum, over the fall of its size, from which damping is not the only explanation."""
+"""Change of the direction of an angular momentum, over the fall of its size, from which damping is not the only explanation; and that of an
+acceleration from which its size is not all that is wrong.
+"""
 ELSEWHERE = 0.1
 """Change of angular momentum about the contact point, over M r v, from which it is stated."""
 TURNED = math.radians(1.0)
@@ -81,13 +83,16 @@ def _of_flight(scene: Scenario, states: Array, exact_states: Array) -> Iterator[
 
 
 def _of_fall(probe: Probe, motion: Trajectory) -> Iterator[str]:
-    """The acceleration of a fall, if both velocities and positions show that it is wrong."""
+    """The acceleration of a fall along gravity, if velocities and positions show the same one, unlike with drag, and it is wrong."""
     right, time, start = probe.scene.acceleration, motion.t[-1], motion.velocity[0]
-    by_velocity = (motion.velocity[-1] - start) / time
-    by_position = 2.0 * (motion.position[-1] - motion.position[0] - time * start) / time**2
-    size, expected = float(np.linalg.norm(by_velocity)), float(np.linalg.norm(right))
-    if abs(size - expected) * time > probe.allowed[2] and (by_velocity - right) @ (by_position - right) > 0.0:
-        yield f"the acceleration is {instead(size, expected, 'm/s²')}"
+    size = float(np.linalg.norm(right))
+    wrong = (motion.velocity[-1] - start) / time - right
+    by_position = 2.0 * (motion.position[-1] - motion.position[0] - time * start) / time**2 - right
+    along = float(wrong @ right) / size
+    apart = np.linalg.norm(by_position - wrong) + np.linalg.norm(wrong - along * right / size)
+    first_order = size * motion.t[1] / time
+    if abs(along) * time > probe.allowed[2] and apart <= ALONG * abs(along) + first_order:
+        yield f"the acceleration is {instead(size + along, size, 'm/s²')}"
 
 
 def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:

@@ -12,7 +12,7 @@ from contextlib import suppress
 from functools import cache
 from glob import glob
 from importlib.util import find_spec, resolve_name
-from itertools import accumulate
+from itertools import accumulate, chain
 from pathlib import Path
 
 from dropspin.comparisons.engines.base import Engine, EngineBroken
@@ -25,7 +25,7 @@ LIBRARIES = re.compile(r".+\.(so(\.\d+)*|dylib|dll|pyd)", re.IGNORECASE)
 SCRIPTS = re.compile(rf"{LIBRARIES.pattern}|.+\.(py|js|mjs|cjs|ts|wasm|jar|class|jl|lua|m|pl|r|rb|sh)", re.IGNORECASE)
 """What a program may load beside libraries; data are left out, because a run may write them."""
 MOST_ENTRIES, MOST_BYTES = 100_000, 2**30
-"""Of files and folders that are searched, and of the files that are hashed: they take about a second."""
+"""Of files and folders below an adapter that are searched, and of the files that are hashed: they take about a second."""
 STANDARD = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib"))
 
 
@@ -45,7 +45,7 @@ def adapter_code(adapter: type[Engine], loaded: Iterable[str] = ()) -> str | Non
         The hash; None for a class that is not in a file.
 
     Raises:
-        EngineBroken: A file of `code_files` does not exist, or by default there are too many files to search or to read.
+        EngineBroken: A file of `code_files` does not exist.
     """
     try:
         file = Path(inspect.getfile(adapter)).resolve()
@@ -61,33 +61,37 @@ def adapter_code(adapter: type[Engine], loaded: Iterable[str] = ()) -> str | Non
 
 def _code_files(adapter: type[Engine], folder: Path) -> Iterable[Path]:
     """The files of `code_files`, by default libraries and scripts in and below a folder."""
-    if adapter.code_files is None:
+    patterns = adapter.code_files
+    if patterns is None:
         return [] if INSTALLED.intersection(folder.parts) else _below(folder, SCRIPTS if issubclass(adapter, ProgramEngine) else LIBRARIES)
-    if isinstance(adapter.code_files, str):
-        raise EngineBroken(f'{adapter.__name__}.code_files is {shown(adapter.code_files)}; give a sequence, such as ("../build/*.so",).')
+    if isinstance(patterns, str) or not all(isinstance(pattern, str) for pattern in patterns):
+        raise EngineBroken(f'{adapter.__name__}.code_files is {shown(patterns)}; give a sequence of strings, such as ("../build/*.so",).')
     found: list[Path] = []
-    for pattern in adapter.code_files:
+    for pattern in patterns:
         files = [folder / path for path in glob(pattern, root_dir=folder, recursive=True) if (folder / path).is_file()]
         if not files:
             raise EngineBroken(f"{adapter.__name__}.code_files: no file {shown(pattern)} in {folder}; paths are relative to this folder.")
         found += files
-    return (path.resolve() for path in found)
+    return map(_real, found)
 
 
 def _below(folder: Path, wanted: re.Pattern[str]) -> list[Path]:
-    """The files with such names in and below a folder, not in hidden folders or in those of installed packages."""
-    found: list[Path] = []
+    """The files with such names in and below a folder, not in hidden or installed ones; those in it alone if very many are below it."""
+    found: list[list[Path]] = []
     entries = size = 0
     for here, folders, names in os.walk(folder):
         folders[:] = [name for name in folders if not name.startswith(".") and name not in INSTALLED]
-        own = [path for path in (Path(here, name).resolve() for name in names if wanted.fullmatch(name)) if os.access(path, os.R_OK)]
-        found += filter(Path.is_file, own)
-        entries, size = entries + len(folders) + len(names), size + sum(path.stat().st_size for path in own)
-        if entries > MOST_ENTRIES or size > MOST_BYTES:
-            much = f"{MOST_ENTRIES} files and folders" if entries > MOST_ENTRIES else f"{MOST_BYTES >> 20} MiB of libraries and scripts"
-            remedy = "put it into a folder of its own, or name in its `code_files` the files that it loads (docs/bring-your-engine.md)"
-            raise EngineBroken(f"{folder}, the folder of an engine's adapter, has more than {much}, any of which it may load; {remedy}.")
-    return found
+        files = [_real(Path(here, name)) for name in names if wanted.fullmatch(name)]
+        found.append([file for file in files if file.is_file() and os.access(file, os.R_OK)])
+        entries, size = entries + len(folders) + len(names), size + sum(file.stat().st_size for file in found[-1])
+        if entries > MOST_ENTRIES or size > MOST_BYTES:  # such as a home folder
+            return found[0]
+    return list(chain(*found))
+
+
+def _real(path: Path) -> Path:
+    """A path without symbolic links, unless these are a loop."""
+    return Path(os.path.realpath(path))
 
 
 def built_in_code(file: Path) -> str:

@@ -94,23 +94,27 @@ def test_libraries_below_an_adapter_or_the_files_that_it_names_belong_to_it(tmp_
 
 
 @pytest.mark.parametrize(
-    ("code_files", "most", "message"),
+    ("code_files", "message"),
     [
-        (
-            None,
-            {"MOST_ENTRIES": 4},
-            r"has more than 4 files and folders, any of which it may load; put it into a folder of its own, ",
-        ),
-        (None, {"MOST_BYTES": 4 << 20}, r"has more than 4 MiB of libraries and scripts, any of which"),
-        (("absent.so",), {}, r"Mine\.code_files: no file 'absent\.so' in .*; paths are relative to this folder\."),
-        ("mine.py", {}, r"Mine\.code_files is 'mine\.py'; give a sequence"),
+        (("absent.so",), r"Mine\.code_files: no file 'absent\.so' in .*; paths are relative to this folder\."),
+        ("mine.py", r"Mine\.code_files is 'mine\.py'; give a sequence of strings"),
+        ((Path("mine.py"),), r"Mine\.code_files is .*; give a sequence of strings"),
     ],
 )
-def test_files_that_cannot_be_told_are_refused(tmp_path, monkeypatch, code_files, most, message):
+def test_files_that_cannot_be_told_are_refused(tmp_path, code_files, message):
+    with pytest.raises(ds.DropspinError, match=message):
+        code.adapter_code(adapter_in(tmp_path, code_files=code_files))
+
+
+@pytest.mark.parametrize("most", [{"MOST_ENTRIES": 4}, {"MOST_BYTES": 4 << 20}], ids=["many entries", "large files"])
+def test_below_a_large_folder_no_file_belongs_to_an_adapter(tmp_path, monkeypatch, most):
+    """Such as a home folder; a library that is a loop of links is none."""
     for name, value in most.items():
         monkeypatch.setattr(code, name, value)
     (tmp_path / "build").mkdir()
     for number in range(3):
         (tmp_path / "build" / f"{number}.so").write_bytes(b"0" * (2 << 20))
-    with pytest.raises(ds.DropspinError, match=message):
-        code.adapter_code(adapter_in(tmp_path, code_files=code_files))
+    (tmp_path / "loop.so").symlink_to("loop.so")
+    adapter = adapter_in(tmp_path)
+    verify_changes_with(adapter, tmp_path / "build" / "0.so", False)
+    verify_changes_with(adapter, tmp_path / "own.so", True)

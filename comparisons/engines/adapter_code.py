@@ -24,12 +24,12 @@ INSTALLED = frozenset({"site-packages", "dist-packages", "node_modules"})
 LIBRARIES = re.compile(r".+\.(so(\.\d+)*|dylib|dll|pyd)", re.IGNORECASE)
 SCRIPTS = re.compile(rf"{LIBRARIES.pattern}|.+\.(py|js|mjs|cjs|ts|wasm|jar|class|jl|lua|m|pl|r|rb|sh)", re.IGNORECASE)
 """What a program may load beside libraries; data are left out, because a run may write them."""
-MOST_ENTRIES, MOST_BYTES = 100_000, 2**30
+MOST_ENTRIES, MOST_BYTES = 100_000, 2**28
 """Of files and folders below an adapter that are searched, and of the files that are hashed: they take about a second."""
 STANDARD = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib"))
 
 
-def adapter_code(adapter: type[Engine], loaded: Iterable[str] = ()) -> str | None:
+def adapter_code(adapter: type[Engine], loaded: Iterable[str] = (), *, with_below: bool = True) -> str | None:
     """A short hash of an adapter's file and of every module that it loads, outside the standard library and installed packages.
 
     The files in the command of a `ProgramEngine` belong to it, and the adapter's `code_files`: by default the shared libraries in and below
@@ -40,6 +40,7 @@ def adapter_code(adapter: type[Engine], loaded: Iterable[str] = ()) -> str | Non
     Args:
         adapter: The engine's class.
         loaded: Names of further modules that were loaded with it.
+        with_below: Whether files in folders below that of the adapter count, which an engine may build when it is first used.
 
     Returns:
         The hash; None for a class that is not in a file.
@@ -56,14 +57,15 @@ def adapter_code(adapter: type[Engine], loaded: Iterable[str] = ()) -> str | Non
     files = _with_imports({file: adapter.__module__}, _file)
     further = {other: name for name in loaded if (other := _file(name)) is not None and other not in files}
     command = filter(os.path.isfile, adapter.command()) if issubclass(adapter, ProgramEngine) else ()
-    return hash_of({*files, *_with_imports(further, _file), *_code_files(adapter, file.parent), *map(Path, command)})
+    return hash_of({*files, *_with_imports(further, _file), *_code_files(adapter, file.parent, with_below), *map(Path, command)})
 
 
-def _code_files(adapter: type[Engine], folder: Path) -> Iterable[Path]:
+def _code_files(adapter: type[Engine], folder: Path, with_below: bool) -> Iterable[Path]:
     """The files of `code_files`, by default libraries and scripts in and below a folder."""
     patterns = adapter.code_files
     if patterns is None:
-        return [] if INSTALLED.intersection(folder.parts) else _below(folder, SCRIPTS if issubclass(adapter, ProgramEngine) else LIBRARIES)
+        wanted = SCRIPTS if issubclass(adapter, ProgramEngine) else LIBRARIES
+        return [] if INSTALLED.intersection(folder.parts) else _found(folder, wanted, with_below)
     if isinstance(patterns, str) or not all(isinstance(pattern, str) for pattern in patterns):
         raise EngineBroken(f'{adapter.__name__}.code_files is {shown(patterns)}; give a sequence of strings, such as ("../build/*.so",).')
     found: list[Path] = []
@@ -75,7 +77,7 @@ def _code_files(adapter: type[Engine], folder: Path) -> Iterable[Path]:
     return map(_real, found)
 
 
-def _below(folder: Path, wanted: re.Pattern[str]) -> list[Path]:
+def _found(folder: Path, wanted: re.Pattern[str], with_below: bool) -> list[Path]:
     """The files with such names in and below a folder, not in hidden or installed ones; those in it alone if very many are below it."""
     found: list[list[Path]] = []
     entries = size = 0
@@ -84,7 +86,7 @@ def _below(folder: Path, wanted: re.Pattern[str]) -> list[Path]:
         files = [_real(Path(here, name)) for name in names if wanted.fullmatch(name)]
         found.append([file for file in files if file.is_file() and os.access(file, os.R_OK)])
         entries, size = entries + len(folders) + len(names), size + sum(file.stat().st_size for file in found[-1])
-        if entries > MOST_ENTRIES or size > MOST_BYTES:  # such as a home folder
+        if not with_below or entries > MOST_ENTRIES or size > MOST_BYTES:  # as below a home folder
             return found[0]
     return list(chain(*found))
 
@@ -111,7 +113,10 @@ def built_in_code(file: Path) -> str:
 
 def hash_of(files: Iterable[Path]) -> str:
     """A short hash of the content of files, in the order of their names."""
-    return hashlib.sha256(b"".join(one.read_bytes() for one in sorted(files, key=lambda path: (path.name, path)))).hexdigest()[:12]
+    sha = hashlib.sha256()
+    for file in sorted(files, key=lambda path: (path.name, path)):
+        sha.update(file.read_bytes())
+    return sha.hexdigest()[:12]
 
 
 def _with_imports(files: Mapping[Path, str], file_of: Callable[[str], Path | None]) -> dict[Path, str]:

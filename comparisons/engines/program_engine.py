@@ -137,7 +137,7 @@ class ProgramSimulation(Simulation):
         patience, most = min(patience, *_most_patience), "" if patience < _most_patience[0] else ", the time limit"
         end = time.monotonic() + patience
         while b"\n" not in self._unread:
-            has_ended = self._process.poll() is not None  # its children may hold its output open
+            has_ended = self._process.poll() not in (None, 0)  # its children may hold its output open, or be the solver
             written = self._written(0.0 if has_ended else max(0.0, min(POLL, end - time.monotonic())))
             if written is None and not has_ended:
                 if time.monotonic() < end:

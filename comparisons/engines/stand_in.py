@@ -36,6 +36,7 @@ class Traits(BaseModel):
         options: The options that were given and differ from the defaults.
         compiles: Whether it compiles when a scene is first simulated.
         code: A hash of every module that the adapter loads, outside the standard library and installed packages.
+        built: The same with the files below its folder, by which results of two engines are told apart.
     """
 
     model_config = ConfigDict(strict=True, frozen=True)
@@ -50,6 +51,7 @@ class Traits(BaseModel):
     options: dict[Short, Short]
     compiles: bool
     code: str | None
+    built: str | None
 
 
 class StandIn(Engine):
@@ -77,7 +79,8 @@ def traits(source: str, engine: Engine, loaded: frozenset[str]) -> Traits:
     """
     kind = type(engine)
     summary = (kind.__doc__ or "").strip().partition("\n")[0][:LONGEST_SUMMARY]
-    stated = {"source": source, "summary": summary, "options": _plain(engine.options), "code": adapter_code(kind, loaded)}
+    stated = {"source": source, "summary": summary, "options": _plain(engine.options), "code": adapter_code(kind, loaded, with_below=False)}
+    stated["built"] = adapter_code(kind, loaded)
     stated |= {name: _plain(getattr(kind, name)) for name in STATED}
     try:
         found = validated(Traits, source, stated)
@@ -98,7 +101,7 @@ def _plain(mapping: Any) -> Any:
 
 def code_of(engine: Engine) -> str | None:
     """The hash of an engine's code; None for a class that is not in a file."""
-    return engine.traits.code if isinstance(engine, StandIn) else adapter_code(type(engine))
+    return engine.traits.built if isinstance(engine, StandIn) else adapter_code(type(engine))
 
 
 def stand_in(known: Traits) -> StandIn:

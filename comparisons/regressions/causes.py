@@ -24,7 +24,7 @@ from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 
 Errors = Callable[[str], float]
 """The error in a metric, by its name."""
-FIRST_SIZE = 1e-3
+FIRST_SIZE, SMALLEST_SIZE = 1e-3, 1e-6
 LARGEST_SIZE = 0.3
 MOST_STEPS = 20_000
 """Largest number of time steps of the sampled exact solutions."""
@@ -105,6 +105,8 @@ def _sizes(scene: Scenario, parameter: Parameter, failed: pd.DataFrame, dt: floa
     uncertainty = (rows["upper"] - rows["lower"] + [negligible(scene, unit) for unit in rows["unit"]]) / rows["value"].abs()
     for sign in (1.0, -1.0):
         size, lead = sign * FIRST_SIZE, None
+        while _simulated(_with(parameter, size), scene) is None and abs(size) > SMALLEST_SIZE:  # as of a restitution of nearly 1
+            size *= 0.1
         for _ in range(ITERATIONS):
             caused = rows.index.to_series().map(_caused(scene, _with(parameter, size), dt).error)
             factors = (rows["value"] / caused).abs().replace([0.0, np.inf], np.nan).dropna()

@@ -27,7 +27,7 @@ class Parameter(NamedTuple):
 
 
 def _scaled(table: str, name: str, scene: Scenario, share: float) -> Scenario:
-    """A number of a table times 1 + share; there is no exact solution with a restitution above 1."""
+    """A number of a table times 1 + share, validated: no scene can have a restitution above 1."""
     value = getattr(getattr(scene, table), name, None)
     return scene if not value or isinstance(value, str) else with_values(scene, table, **{name: (1.0 + share) * value})
 

@@ -45,8 +45,9 @@ def shares(
 
     Returns:
         The share of one setting, and that which a second one adds to it; or of two together, by both names, where their own shares do not
-        add up. Where the sum is above 1, these are alternatives, unless a share is negative: that setting reduces the error. Empty if no
-        one or two of them explain nine tenths of the error.
+        add up. Where the sum is above 1, these are alternatives, unless a share is negative: that setting reduces the error. If no one or
+        two of them explain nine tenths of the error: with `partly` one setting and the part that it explains, also where an error of the
+        other sign is left, else empty.
     """
     error = cache(error)
     whole, calibrated = error(frozenset()), error(frozenset(changed))

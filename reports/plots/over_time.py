@@ -26,6 +26,8 @@ curve is drawn as an envelope if it is not resolved for a tenth of its time. An 
 NEARBY, HARDLY_SEEN = 16, 0.2
 """Drawn points over which the range is taken, and its least value, relative to that of the whole curve: a late oscillation may be small."""
 POINTS_A_TURN = 32
+MOST_BETWEEN = 64
+"""States of the exact solution from one drawn point to the next, by which it is seen whether these resolve it."""
 MOST_SAMPLES = 200_000
 
 
@@ -74,13 +76,16 @@ def over_time(results: Results, scene_name: str, quantity: Quantity) -> Chart:
     """
     scene = results.scenes[scene_name]
     truth = reference_for(scene)
-    lines, times = [], np.linspace(0.0, scene.duration, MOST_POINTS)
+    lines: list[Line] = []
+    times = steps = np.linspace(0.0, scene.duration, MOST_POINTS)
     for motion, style in at_one_step(results, results.trajectories, scene_name, max):
-        times = motion.t[:: stride(len(motion))]
+        steps = motion.t
+        times = steps[:: stride(len(steps))]
         lines.append(_drawn(Line(x=motion.t, y=quantity(scene, motion), **style), times))
     if truth is not None:
         end = min(scene.duration, truth.horizon)
-        exact = _sampled(truth, times, end) if truth.frames is None else truth(truth.frames[truth.frames <= end])
+        finer = steps[:: max(1, stride(len(steps)) // MOST_BETWEEN)]
+        exact = _sampled(truth, finer, end) if truth.frames is None else truth(truth.frames[truth.frames <= end])
         line = Line(truth.word, exact.t, quantity(scene, exact), width=1.0, dashes="dashed")
         lines.append(_drawn(line, times) if truth.is_exact else line)
     envelopes = any(line.is_fill for line in lines)
@@ -95,9 +100,7 @@ def plot_over_time(results: Results, scene_name: str, quantity: Quantity, axes: 
 
 
 def _sampled(truth: Truth, times: Array, end: float) -> Trajectory:
-    """The exact solution at these times up to its end, at and half-way between events, and at as many times as every turn needs."""
-    events = np.array([event.time for event in truth.events])
-    times = np.unique(np.concatenate([times, events, 0.5 * (events[1:] + events[:-1])]))
+    """The exact solution at these times up to its end, and at as many times between them as are needed to resolve every turn."""
     coarse = truth(times[times <= end])
     fastest = float(np.linalg.norm(coarse.angular_velocity, axis=1).max(initial=0.0))
     turned = angle_between_orientations(coarse.orientation[:-1], coarse.orientation[1:]).max(initial=0.0)
@@ -118,7 +121,7 @@ def _drawn(line: Line, times: Array) -> Line:
     ranges = np.fmax.reduceat(line.y, parts) - np.fmin.reduceat(line.y, parts)
     nearby = np.repeat(np.clip(ranges, HARDLY_SEEN * reach, reach), np.diff(parts, append=len(line.y)))
     missed = (np.abs(np.interp(line.x, x, y) - line.y) > RESOLVED * nearby)[finite]
-    constant = reach <= FLAT * float(np.abs(line.y[finite]).max(initial=0.0))
+    constant = reach <= FLAT * float(np.abs(line.y[finite]).max(initial=1.0))  # in SI units 1e-9 is rounding, too
     if constant or not finite.any() or missed @ np.gradient(line.x)[finite] <= MOST_MISSED * (line.x[-1] - line.x[0]):
         return replace(line, x=x, y=y)
     low, high = (extreme.reduceat(line.y, shown) for extreme in (np.fmin, np.fmax))  # without NaN, as far as there is a number

@@ -166,7 +166,7 @@ def replay_together(scene: Scenario, dt: float, moved: Mapping[str, Trajectory])
     shown = np.union1d(np.arange(0, steps + 1, every), first_event).astype(np.intp)
     motions = [_motion(scene, truth, label, styles[label].colour, motion, shown) for label, motion in moved.items()]
     if truth is not None:
-        motions.append(_exact_motion(scene, truth, dt * shown.astype(np.float64)))
+        motions.append(_exact_motion(scene, truth, dt * np.arange(steps + 1.0), shown))
     return Replay(scene, dt, dt * every, [motion for motion in motions if len(motion.frames) > 1])
 
 
@@ -188,20 +188,29 @@ def _motion(scene: Scenario, truth: Truth | None, label: str, colour: str, motio
         impacts = Impacts(motion.t[main], *contact_impulses(scene, motion, before, after))
         # A body bounces between two states: interpolated over a longer time, it would turn back above the floor.
         rows = np.union1d(rows, np.concatenate([main - 1, main]))
-    frames = motion[rows]
-    rotations = np.add.reduceat(rotations_of_steps(motion[: rows[-1] + 1]), rows[:-1]) if len(rows) > 1 else np.empty((0, 3))
+    frames, rotations = _framed(motion, rows)
     return Motion(label, colour, frames, rotations, None if truth is None else _errors(frames, exactly(truth, frames.t)), impacts)
 
 
-def _exact_motion(scene: Scenario, truth: Truth, times: Array) -> Motion:
-    times = np.union1d(times, [event.time for event in truth.events])
+def _exact_motion(scene: Scenario, truth: Truth, times: Array, rows: Rows) -> Motion:
+    """The exact solution, with frames at some of the times of steps, and at its events."""
+    events = [event.time for event in truth.events]
+    frames_at, every = np.union1d(times[rows], events), np.union1d(times, events)
     states = np.array([[event.before, event.after] for event in truth.events]).reshape(-1, 13)
-    pairs = Trajectory.from_states(np.repeat([event.time for event in truth.events], 2), states)
+    pairs = Trajectory.from_states(np.repeat(events, 2), states)
     # A change of friction is an event, but no impact.
     before = 2 * np.flatnonzero(np.any(states[::2, RATES] != states[1::2, RATES], axis=1))
     impacts = Impacts(pairs.t[before], *contact_impulses(scene, pairs, before, before + 1))
-    frames = exactly(truth, times)
-    return Motion(truth.word, "", frames, rotations_of_steps(frames), None, impacts)
+    motion = exactly(truth, every)
+    shown = np.searchsorted(every, frames_at)
+    return Motion(truth.word, "", *_framed(motion, shown[shown < len(motion)]), None, impacts)
+
+
+def _framed(motion: Trajectory, rows: Rows) -> tuple[Trajectory, Array]:
+    """The frames of a motion at some rows, and the sum of the rotations of all steps between them."""
+    if len(rows) < 2:
+        return motion[rows], np.empty((0, 3))
+    return motion[rows], np.add.reduceat(rotations_of_steps(motion[: rows[-1] + 1]), rows[:-1])
 
 
 def _errors(motion: Trajectory, exact: Trajectory) -> Array:

@@ -81,6 +81,14 @@ def test_body_turns_as_its_states_do_and_not_as_its_angular_velocity_says():
         assert angle_between_orientations(a_quarter_later(motion, frame), expected) < 1e-9
 
 
+def test_exact_engine_turns_as_the_exact_solution_does():
+    """A body that tumbles, for 60 s: several turns about axes that change between frames 0.2 s apart."""
+    body = {"shape": "box", "mass": 1.0, "half_extents": [0.05, 0.1, 0.2]}
+    scene = ds.load({"duration": 60.0, "body": body, "start": {"angular_velocity": [60.0, 30.0, 30.0]}})
+    engine, exact = replay_together(scene, 0.01, {"same": truth_for(scene)(0.01 * np.arange(6001))}).motions
+    np.testing.assert_array_equal(engine.turns, exact.turns)
+
+
 def test_last_state_is_a_frame():
     """For every number of steps that has a suitable divisor."""
     for steps in (150, 375, 2500, 1750, 10_000):

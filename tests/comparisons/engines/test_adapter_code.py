@@ -118,3 +118,14 @@ def test_below_a_large_folder_no_file_belongs_to_an_adapter(tmp_path, monkeypatc
     adapter = adapter_in(tmp_path)
     verify_changes_with(adapter, tmp_path / "build" / "0.so", False)
     verify_changes_with(adapter, tmp_path / "own.so", True)
+
+
+def test_library_that_an_engine_builds_below_its_folder_ends_no_command(tmp_path):
+    """The code with which a command begins is that of the modules; a later command finds another engine."""
+    adapter = adapter_in(tmp_path)
+    before = code.adapter_code(adapter), code.adapter_code(adapter, with_below=False)
+    (tmp_path / "build").mkdir()
+    (tmp_path / "build" / "engine.so").write_bytes(b"built")
+    after = code.adapter_code(adapter), code.adapter_code(adapter, with_below=False)
+    assert after[0] != before[0]
+    assert after[1] == before[1]

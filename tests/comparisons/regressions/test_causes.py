@@ -1,6 +1,7 @@
 """The single cause with which the asymptotic errors of an engine are consistent: a wrong parameter, a known fault, or none."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from support import engines as made
 from support.detection_power import FAULTS, faulty_engine
@@ -10,7 +11,7 @@ from support.releases import TODAY, WithoutGyroscopicTerm, relabelled
 
 from dropspin.comparisons.faults import parameters as mistakes
 from dropspin.comparisons.regressions.baseline import Baseline
-from dropspin.comparisons.regressions.causes import _caused, _explained, _with, causes
+from dropspin.comparisons.regressions.causes import _caused, _explained, _sizes, _with, causes
 from dropspin.comparisons.regressions.checking import accept, check
 from dropspin.comparisons.regressions.parameters import PARAMETERS
 from dropspin.comparisons.running.arguments import DEFAULT_DTS
@@ -253,7 +254,10 @@ def test_cause_with_which_the_exact_solution_ends_at_once_explains_nothing():
 
 
 def test_restitution_above_1_is_no_cause():
-    """Its exact solution would be that of none."""
+    """No scene can have it; of 0.9999, a size that is small enough is tried."""
     elastic = with_values(load("drop-ball"), "floor", restitution=1.0)
     assert np.isnan(_caused(elastic, _with(PARAMETERS[0], 1e-3), 2e-3).error("bounce_height_error"))
     assert _caused(elastic, _with(PARAMETERS[0], -1e-3), 2e-3).error("bounce_height_error") == pytest.approx(-2e-3, rel=0.01)
+    nearly = with_values(load("drop-ball"), "floor", restitution=0.9999)
+    failed = pd.DataFrame([{"metric": "restitution_error", "unit": "1", "value": 5e-5, "lower": 4.9e-5, "upper": 5.1e-5}])
+    assert list(_sizes(nearly, PARAMETERS[0], failed, 2e-3)) == pytest.approx([5e-5, -5e-5], rel=0.01)

@@ -40,7 +40,8 @@ def adapter_code(adapter: type[Engine], loaded: Iterable[str] = (), *, with_belo
     Args:
         adapter: The engine's class.
         loaded: Names of further modules that were loaded with it.
-        with_below: Whether files in folders below that of the adapter count, which an engine may build when it is first used.
+        with_below: Whether files in folders below that of the adapter count, and scripts of a program beside it, which an engine may
+            build when it is first used.
 
     Returns:
         The hash; None for a class that is not in a file.
@@ -64,7 +65,7 @@ def _code_files(adapter: type[Engine], folder: Path, with_below: bool) -> Iterab
     """The files of `code_files`, by default libraries and scripts in and below a folder."""
     patterns = adapter.code_files
     if patterns is None:
-        wanted = SCRIPTS if issubclass(adapter, ProgramEngine) else LIBRARIES
+        wanted = SCRIPTS if with_below and issubclass(adapter, ProgramEngine) else LIBRARIES
         return [] if INSTALLED.intersection(folder.parts) else _found(folder, wanted, with_below)
     if isinstance(patterns, str) or not all(isinstance(pattern, str) for pattern in patterns):
         raise EngineBroken(f'{adapter.__name__}.code_files is {shown(patterns)}; give a sequence of strings, such as ("../build/*.so",).')

@@ -96,7 +96,8 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
     """The errors by the first metric, from the coarsest time step to those at which they stop falling, or to the end of the budget.
 
     The errors by the second metric, that of the motion, must fall too. Otherwise the engine is left out, because it may simulate another
-    motion, for which a small error by the first metric has no meaning: Wang's method conserves the energy of a rotation that is wrong.
+    motion, for which a small error by the first metric has no meaning: Wang's method conserves the energy of a rotation that is wrong. It
+    takes part if its errors by the second metric are undefined.
 
     Args:
         entry: The engine.
@@ -152,9 +153,9 @@ def _left_out(scene: Scenario, tried: Sequence[tuple[float, list[float]]], metri
     """The reason why an engine is left out: no error is finite, or large errors of the motion do not fall; empty if it takes part."""
     first, last = (f"{1e3 * tried[place][0]:.4g} ms" for place in (0, -1))
     range_tried = f"{len(tried)} time steps tried, {first} to {last}" if len(tried) > 1 else f"only time step tried, {first}"
-    errors = [motion for _, (_, motion) in tried if np.isfinite(motion)]
-    if not errors:
+    if not np.isfinite([error for _, (error, _) in tried]).any():
         return f"no error is finite at the {range_tried}: {reason}"
+    errors = [motion for _, (_, motion) in tried if np.isfinite(motion)]  # none if a flight is too short for it, for example
     size = _covered(scene) if METRICS[metric].unit == "m" else 1.0
     if len(errors) > FEWEST_POINTS and min(errors) > max(CONVERGED * max(errors), WRONG * size):
         unit = "" if METRICS[metric].unit == "1" else f" {METRICS[metric].unit}"
@@ -170,22 +171,31 @@ def _covered(scene: Scenario) -> float:
 
 
 def _errors(entry: EngineEntry, scene: Scenario, dt: float, division: int, metrics: Sequence[str]) -> tuple[list[float], float, str]:
-    """Absolute values of metrics at a time step, and the processor time of their measurement [s]; if one is undefined, NaN and why."""
+    """Absolute values of metrics at a time step, NaN where undefined, their processor time [s], and why the first is undefined."""
     start = processor_time()
     verify_accepted(entry.adapter, scene)
     truth, every = truth_for(scene), division if scene.floor is None else 1
     phases = [StartPhase(scene, truth)] if scene.floor is None else start_phases(scene, truth, dt)
-    motions, why = [], "the metric has no value"
+    motions, errors = [], [math.nan] * len(metrics)
     try:
         motions = [record(entry.adapter, phase.scene, dt, every).motion for phase in phases]
         cases = [Comparison.with_truth(phase.scene, motion, phase.truth) for phase, motion in zip(phases, motions, strict=True)]
-        errors = [abs(METRICS[metric].value(cases)) for metric in metrics]
-        if np.isfinite(errors).all():
-            return errors, processor_time() - start, ""
-    except (Diverged, Unresolved) as error:
+        errors, [why, *_] = map(list, zip(*(_error(metric, cases) for metric in metrics), strict=True))
+    except Diverged as error:
         why = short(str(error))
+    if np.isfinite(errors[0]):
+        return errors, processor_time() - start, ""
     why = next((broken.reason for broken in map(divergence, motions) if broken), why)
-    return [math.nan] * len(metrics), processor_time() - start, why
+    return errors, processor_time() - start, why
+
+
+def _error(metric: str, cases: Sequence[Comparison]) -> tuple[float, str]:
+    """The absolute value of a metric; NaN and why if it is undefined."""
+    try:
+        error = abs(METRICS[metric].value(cases))
+    except Unresolved as unresolved:
+        return math.nan, short(str(unresolved))
+    return (error, "") if np.isfinite(error) else (math.nan, "the metric has no value")
 
 
 def processor_time() -> float:

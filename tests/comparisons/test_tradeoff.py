@@ -342,6 +342,16 @@ def test_engine_that_does_not_converge_is_left_out(spin):
     assert min(point.error for point in spin.points if "exact" in point.engine) < 1e-13
 
 
+def test_metric_is_compared_where_that_of_the_motion_is_undefined():
+    """A capsule flies too briefly after its first impact to have a bounce height, but has an orientation."""
+    body = {"shape": "capsule", "radius": 0.05, "half_length": 0.1, "mass": 0.5}
+    start = {"position": [0.0, 0.5, 0.0], "orientation": [0.3, 0.2, 0.5, 0.8], "angular_velocity": [1.0, 2.0, -3.0]}
+    floor = {"gravity": {"acceleration": [1.0, -9.8, 0.0]}, "floor": {"restitution": 0.5, "friction": 0.3}}
+    found = tradeoff(load({"duration": 1.2, "body": body, "start": start, **floor}), ["mujoco"], metric="orientation_error", budget=0.1)
+    assert found.points
+    assert not found.left_out
+
+
 @pytest.mark.extended
 def test_engine_that_conserves_the_energy_of_a_wrong_motion_is_left_out():
     """Wang's method keeps the energy of a spin that it gets wrong; midpoint keeps that of the right one."""

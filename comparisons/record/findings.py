@@ -109,6 +109,16 @@ def read(folder: str | Path) -> dict[str, list[Release]]:
     return found
 
 
+def on_other_machines(folder: str | Path, shown: Mapping[str, Sequence[Release]]) -> dict[str, list[str]]:
+    """The releases of each engine that were measured here on other machines alone than those that `read` returned."""
+    found: dict[str, list[str]] = {}
+    for path in sorted((Path(folder) / OWN).glob("*.parquet")):
+        first = stored(path)[1][0]
+        if first["release"] not in {release.name for release in shown[first["engine"]]}:
+            found.setdefault(first["engine"], []).append(first["release"])
+    return found
+
+
 def in_order(record: Record, engine: str, names: Iterable[str]) -> list[Release]:
     """The releases of an engine that this machine measured, in the order of their names."""
     here = machine()

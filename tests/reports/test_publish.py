@@ -7,7 +7,9 @@ from html.parser import HTMLParser
 
 import pytest
 from support.cli import assert_refused, dropspin
-from support.small_record import HOSTILE, SCENES, write_record
+from support.small_record import HOSTILE, SCENES, rows, write_record
+
+from dropspin.comparisons.record.store import Record, machine
 
 
 @pytest.fixture(scope="module")
@@ -145,6 +147,17 @@ def test_site_within_the_documentation_links_to_it(site):
     assert dropspin("record", "publish", "record", "-o", "docs/record", cwd=folder).returncode == 0
     assert "../problems/DS-008.html" in Page(folder / "docs/record/scene-spin-asymmetric.html").links
     assert "../index.html" in Page(folder / "docs/record/index.html").links
+
+
+def test_releases_of_another_machine_are_left_out_with_a_word(tmp_path):
+    """A new release that another machine measured is on no page."""
+    write_record(tmp_path / "record")
+    here = Record(tmp_path / "record")
+    here.write("pybullet", "3.2.7", [*rows("pybullet", 0.0)], {**machine(), "processor": "another", "versions": "pybullet 3.2.7"})
+    here.write("mujoco", "3.12.0", [*rows("mujoco", 0.0)], {**machine(), "processor": "another", "versions": "mujoco 3.12.0"})
+    done = dropspin("record", "publish", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stderr == "left out: mujoco 3.12.0, measured on another machine than most releases of mujoco\n"
 
 
 def test_folder_without_a_record_is_refused(tmp_path):

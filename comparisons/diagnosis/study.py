@@ -201,13 +201,13 @@ def _model_of_mesh(path: Path, given: str, folder: Path, density: float, scale: 
     Raises:
         DropspinError: The file is no mesh, or the mesh has no volume.
     """
-    import trimesh  # takes half a second
-
     points, faces = read_mesh(path, given)
     if why := openness(points, faces):
         raise DropspinError(f"{given}: the mesh {why}, so that it has no volume; mend it, or give the body in an MJCF file.")
     mesh = path.resolve()
     if path.suffix.lower() == ".stl":  # MuJoCo reads no text
+        import trimesh  # takes half a second
+
         mesh = folder / "mesh.stl"
         trimesh.Trimesh(points, faces, process=False).export(mesh)
     is_inside_out = np.linalg.det(points[faces]).sum() < 0.0  # of which MuJoCo refuses the exact volume

@@ -35,8 +35,9 @@ class Traits(BaseModel):
         accuracy: The values of options that set the accuracy.
         options: The options that were given and differ from the defaults.
         compiles: Whether it compiles when a scene is first simulated.
-        code: A hash of every module that the adapter loads, outside the standard library and installed packages.
-        built: The same with the files below its folder, by which results of two engines are told apart.
+        code: A hash of the adapter's code: of every module that it loads, outside the standard library and installed packages, and of
+            libraries and scripts below its folder.
+        modules: The same without what an engine may build when it is first used.
     """
 
     model_config = ConfigDict(strict=True, frozen=True)
@@ -51,7 +52,7 @@ class Traits(BaseModel):
     options: dict[Short, Short]
     compiles: bool
     code: str | None
-    built: str | None
+    modules: str | None
 
 
 class StandIn(Engine):
@@ -79,8 +80,8 @@ def traits(source: str, engine: Engine, loaded: frozenset[str]) -> Traits:
     """
     kind = type(engine)
     summary = (kind.__doc__ or "").strip().partition("\n")[0][:LONGEST_SUMMARY]
-    stated = {"source": source, "summary": summary, "options": _plain(engine.options), "code": adapter_code(kind, loaded, with_below=False)}
-    stated["built"] = adapter_code(kind, loaded)
+    stated = {"source": source, "summary": summary, "options": _plain(engine.options)}
+    stated |= {"code": adapter_code(kind, loaded), "modules": adapter_code(kind, loaded, with_below=False)}
     stated |= {name: _plain(getattr(kind, name)) for name in STATED}
     try:
         found = validated(Traits, source, stated)
@@ -101,7 +102,7 @@ def _plain(mapping: Any) -> Any:
 
 def code_of(engine: Engine) -> str | None:
     """The hash of an engine's code; None for a class that is not in a file."""
-    return engine.traits.built if isinstance(engine, StandIn) else adapter_code(type(engine))
+    return engine.traits.code if isinstance(engine, StandIn) else adapter_code(type(engine))
 
 
 def stand_in(known: Traits) -> StandIn:

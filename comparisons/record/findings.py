@@ -20,7 +20,7 @@ from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.measuring.tolerances import NEGLIGIBLE, scale, tolerance
 from dropspin.comparisons.record.plan import load_plan
-from dropspin.comparisons.record.store import MACHINE, OTHERS, OWN, Record, Row, machine, stored
+from dropspin.comparisons.record.store import MACHINE, NAME, OTHERS, OWN, Record, Row, machine, stored
 from dropspin.scenarios import DropspinError, load
 from dropspin.scenarios.loading import names
 from dropspin.scenarios.state import Array
@@ -113,9 +113,10 @@ def on_other_machines(folder: str | Path, shown: Mapping[str, Sequence[Release]]
     """The releases of each engine that were measured here on other machines alone than those that `read` returned."""
     found: dict[str, list[str]] = {}
     for path in sorted((Path(folder) / OWN).glob("*.parquet")):
-        first = stored(path)[1][0]
-        if first["release"] not in {release.name for release in shown[first["engine"]]}:
-            found.setdefault(first["engine"], []).append(first["release"])
+        named = NAME.fullmatch(path.name)
+        assert named is not None  # or `read` refuses the file
+        if named[2] not in {release.name for release in shown[named[1]]}:
+            found.setdefault(named[1], []).append(named[2])
     return found
 
 

@@ -101,7 +101,7 @@ def _constructed(entry: EngineEntry) -> EngineEntry:
         engine = constructed(known.source, entry.engine.options)
     except DropspinError as error:
         raise AnotherAdapter("crashed", str(error)) from None
-    if adapter_code(type(engine), frozenset(sys.modules) - before, with_below=False) != known.code:
+    if adapter_code(type(engine), frozenset(sys.modules) - before, with_below=False) != known.modules:
         remedy = "give the command again, with the same code on all machines"
         raise AnotherAdapter("crashed", f"the code of {known.source} is not that with which the command began; {remedy}")
     return replace(entry, engine=engine)

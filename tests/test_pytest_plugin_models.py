@@ -17,7 +17,7 @@ def failure(dropspin_model, monkeypatch):
     """The function from what the command ends with to the message of the test."""
 
     def of(code, rows, **given):
-        done = subprocess.CompletedProcess([], code, stdout=json.dumps(rows), stderr="running cup.xml\n")
+        done = subprocess.CompletedProcess([], code, stdout=json.dumps(rows), stderr="working on cup.xml\n")
         monkeypatch.setattr(pytest_plugin.Runs, "dropspin", lambda *_: done)
         with pytest.raises(pytest.fail.Exception) as failed:
             dropspin_model("cup.xml", **given)

@@ -78,7 +78,7 @@ def share_bar(title: str) -> Iterator[Callable[[str, float], None]]:
         nonlocal has_begun
         stop_if_interrupted()
         if bar.disable and not has_begun:
-            echo(f"running {title}", err=True)
+            echo(f"working on {title}", err=True)
         has_begun = True
         bar.update(task, completed=share, description=safe(f"{title}: {work}"))
 

@@ -20,7 +20,7 @@ def test_an_output_folder_that_cannot_be_written_fails_before_the_work(verb, fol
     done = dropspin(verb, "spin-principal", "-e", "mujoco", "-o", folder, cwd=tmp_path)
     assert done.returncode == 2
     assert f"dropspin: {folder}: cannot be written: " in done.stderr
-    assert "running spin-principal" not in done.stderr
+    assert "working on spin-principal" not in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
 

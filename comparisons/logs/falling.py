@@ -34,7 +34,10 @@ def flights_in_any_units(log: Log, alarm: float, report: Callable[[str, float], 
     down = log.header.acceleration
     acceleration = _acceleration(log, down)
     flights = flights_of(log, acceleration, report)
-    if flights is None or (acceleration is not down and not _flies(flights, alarm)):
+    if acceleration is not down and (flights is None or not _flies(flights, alarm)):  # more frames lie at rest than fall
+        flights = flights_of(log, down, report)
+        flights = None if flights is None or 2 * len(flights.found) < len(log.tosses) else flights
+    if flights is None:
         needed = max(window_size(toss, noise_of(log), down) for toss in log.tosses)
         raise DropspinError(
             f"{log.origin}: no toss has {needed} frames of free flight with one acceleration; film from the release on, and give "

@@ -21,8 +21,12 @@ _Rated = Sequence[tuple[Flight, Array | None, Array]]
 
 MOST_NOISE, ALLOWED = 3.0, 0.1
 """Multiple of the noise of recorded rates, and share of their size, up to which they agree with the motion."""
-RESTS_NEAR = 0.04
+RESTS_NEAR = 0.02
 """Of the size of the body: how far above or below the floor it may rest, by errors of its own size and of tags."""
+ENDS_NEAR = 0.04
+"""Of the size of the body: how far below the floor flights may end, the last frame of which may be one of a contact."""
+SAME_SIZE = 0.02
+"""Relative difference of heights on several faces from the expected ones, up to which the size of the body is right."""
 BAD_FRAMES = (1, 2, 3)
 """Numbers of bad frames that are tried."""
 CLEAR = 20.0
@@ -105,11 +109,16 @@ def _of_column(
     noise = white / float(np.median([flight.duration for flight, *_ in known]))
     size = float(np.median(length(exact))) or float(np.median(length(given)))
 
+    def factor_of(rates: Array) -> float:
+        """The factor by which the rates are those of the motion, by least squares."""
+        return float(np.sum(rates * exact)) / (float(np.sum(exact**2)) or 1.0)
+
     def explained(rates: Array, factor: float) -> bool:
         """Whether the rates over a factor agree with those of the motion."""
         return float(np.median(length(rates / factor - exact))) <= max(MOST_NOISE * (rough / abs(factor) + noise), ALLOWED * size)
 
-    if explained(given, 1.0):
+    off = abs(factor_of(given) - 1.0)  # of rates that are cut off, more than half may be right
+    if explained(given, 1.0) and not (off > ALLOWED and off * size > MOST_NOISE * (rough + noise)):
         return
     found: list[tuple[Cause | None, ...]] = []
     frames = [(), (frame,)][:: -1 if in_body else 1]
@@ -118,14 +127,14 @@ def _of_column(
     for axis in ("", *"xyz") if kind == "spin" else ("",):
         columns_read = recorded * [1.0 if axis in ("", other) else -1.0 for other in "xyz"]
         for in_frame, rates in zip(frames, (rotate(upright, columns_read), rotate(turned, columns_read)), strict=True):
-            factor = float(np.sum(rates * exact)) / (float(np.sum(exact**2)) or 1.0)
+            factor = factor_of(rates)
             is_scaled = abs(abs(factor) - 1.0) > ALLOWED
             if (factor > 0.0 or (factor < 0.0 and not axis)) and explained(rates, factor):
                 in_degrees = kind == "spin" and abs(math.radians(abs(factor)) - 1.0) < ALLOWED
                 unit = Cause("degrees" if in_degrees else f"unit of the {kind}", abs(factor) - 1.0)
                 mirror = [Cause(f"mirror {axis}")] if axis else []
                 found.append((*in_frame, *mirror, *[Cause(f"sign of the {kind}")] * (factor < 0.0), *[unit] * is_scaled))
-    difference = float(np.median(length(given - exact))) / size
+    difference = max(float(np.median(length(given - exact))) / size, off)
     for cause in min(found, key=len, default=(None,)):
         yield Finding(kind, difference, 0.0, causes=() if cause is None else (cause,))
 
@@ -218,6 +227,8 @@ def _in_mid_air(flights: Flights) -> dict[str, float]:
 def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:
     """Of bodies that rest above the floor or below it by more than errors of the scale and of the tracked point explain, or fly below it.
 
+    Heights on several faces tell a floor at another height from a body of another size.
+
     `alarm` is the probability with which these errors may be larger.
     """
     header, found, resting = flights.log.header, flights.moving, rests(flights.log)
@@ -227,7 +238,7 @@ def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:
     if not flights.show_offset.all() or not math.isfinite(above):
         flown = [heights_in(header, flight) for flight in flights.found]
         height, toss = min((float(one.max()), flight.toss.name) for one, flight in zip(flown, flights.found, strict=True))
-        deep = 4.0 * found.noise.white + RESTS_NEAR * header.body.size
+        deep = 4.0 * found.noise.white + ENDS_NEAR * header.body.size
         if height < 0.0:
             yield Finding("below", -height, 0.0, toss)
         elif (median := float(np.median([one[-1] for one in flown]))) < -deep:
@@ -237,5 +248,7 @@ def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:
     by_scale = (abs(found.values[1] / header.gravity + 1.0) + wide[1] / header.gravity) * float(np.mean(np.abs(resting.expected)))
     by_point = float(np.linalg.norm(np.abs(off) + wide[OFFSET]))
     if abs(above) > 4.0 * error + by_scale + by_point + RESTS_NEAR * header.body.size:
-        height = round(header.floor_height + above, 4)
-        yield Finding("floor", above, 0.0, causes=(Cause("floor", keys={"floor_height": height}),))
+        floor, (stretch, spread) = Cause("floor", keys={"floor_height": round(header.floor_height + above, 4)}), resting.stretch()
+        is_size = abs(stretch - 1.0) > 4.0 * spread + SAME_SIZE
+        causes = (Cause("size of the body"),) if is_size else (floor, Cause("size of the body")) if math.isnan(stretch) else (floor,)
+        yield Finding("floor", above, 0.0, causes=causes, rests=stretch)

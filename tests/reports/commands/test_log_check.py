@@ -176,7 +176,7 @@ def test_parameter_without_contact_is_not_identified_because_of_the_floor(touche
     [
         (
             Finding("floor", -0.35, 0.0, causes=(Cause("floor", keys={"floor_height": -0.25}),)),
-            "Bodies at rest are 350 mm below the floor of the header. Remedy: floor_height = -0.25.",
+            "Bodies at rest are 350 mm below the floor of the header: the floor is at another height. Remedy: floor_height = -0.25.",
         ),
         (
             Finding("frame dropped", 1.0, 0.0, "2", 15),

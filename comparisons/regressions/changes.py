@@ -145,10 +145,13 @@ def regressed(found: pd.DataFrame) -> pd.DataFrame:
 
 
 def most_changed_first(found: pd.DataFrame) -> pd.DataFrame:
-    """Changes, the largest relative to its tolerance first; metrics that change in jumps come last."""
-    ordered = found.assign(jumps=found["metric"].isin(list(JUMPING)))
-    ordered = ordered.sort_values(["jumps", "in_tolerances"], ascending=[True, False], na_position="last", kind="stable")
-    return ordered.drop(columns="jumps").reset_index(drop=True)
+    """Changes, the largest relative to its tolerance first; fits to several time steps and metrics that change in jumps come last.
+
+    Fits follow from the errors at each time step, and a limit near 0 has a small tolerance.
+    """
+    ordered = found.assign(later=found["metric"].isin(list(JUMPING)) | found["kind"].isin(STUDIES))
+    ordered = ordered.sort_values(["later", "in_tolerances"], ascending=[True, False], na_position="last", kind="stable")
+    return ordered.drop(columns="later").reset_index(drop=True)
 
 
 def digests_of(stamp: Mapping[str, Any]) -> Digests:

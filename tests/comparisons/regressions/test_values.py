@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from dropspin.comparisons.measuring.metric import Average
 from dropspin.comparisons.measuring.tolerances import tolerance
-from dropspin.comparisons.regressions.changes import KEY, changes, comparable_results
+from dropspin.comparisons.regressions.changes import KEY, changes, comparable_results, most_changed_first
 from dropspin.scenarios import load
 
 
@@ -77,3 +77,9 @@ def test_tolerance_of_a_single_start_is_its_sensitivity_to_rounding(before):
     assert len(tumble) == 6  # two engines, three time steps
     assert (tumble["tolerance"] < 1e-9).all()  # measured 1e-11 to 1e-10
     assert (tumble["tolerance"] > 1e-12).all()
+
+
+def test_fits_to_several_time_steps_are_listed_after_the_errors_that_they_follow_from():
+    """A limit of 1e-14 has a tolerance of 1e-13, of which any error is very many."""
+    rows = pd.DataFrame({"metric": "energy_error", "kind": ["asymptotic_error", "truth", "order"], "in_tolerances": [1e6, 30.0, 2.0]})
+    assert most_changed_first(rows)["kind"].tolist() == ["truth", "asymptotic_error", "order"]

@@ -53,8 +53,9 @@ def _of(findings: Sequence[Finding], engine: str, symmetry: str) -> list[Finding
 def _cell(findings: Sequence[Finding]) -> str:
     if not findings or findings[0].status == "not run":
         return "–"
-    worst = findings[0]
-    return f"{MEANINGS[worst.status][0]} {f'{worst.difference:.0e}' if worst.difference else 0}"
+    worst, ran = findings[0], sum(finding.status != "not run" for finding in findings)
+    part = f" ({ran} of {len(findings)})" if ran < len(findings) else ""
+    return f"{MEANINGS[worst.status][0]} {f'{worst.difference:.0e}' if worst.difference else 0}{part}"
 
 
 def worst_lost(findings: Sequence[Finding]) -> list[Finding]:

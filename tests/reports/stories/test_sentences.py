@@ -74,6 +74,14 @@ def test_every_status_and_verdict_has_words():
 
 
 @pytest.mark.parametrize(
+    ("statuses", "cell"), [(["kept", "not run"], "✓ 1e-12 (1 of 2)"), (["kept", "kept"], "✓ 1e-12"), (["not run"], "–")]
+)
+def test_a_symmetry_that_few_scenes_tested_says_so(statuses, cell):
+    found = [Finding(f"s{number}", "a", "mirrored", status, 1e-12) for number, status in enumerate(statuses)]
+    assert symmetries.worst_table(found).rows == [{"the scene": "mirrored", "a": cell}]
+
+
+@pytest.mark.parametrize(
     ("sentence", "expected"),
     [
         (conformance(PASSED), "The check does not fail."),

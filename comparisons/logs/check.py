@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from dropspin.comparisons.logs.falling import flights_in_any_units
-from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, falls, positions
+from dropspin.comparisons.logs.flight import OFFSET, falls, positions
 from dropspin.comparisons.logs.flights import Flights, flights_of
-from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
+from dropspin.comparisons.logs.gravity import ALARM, gravity_interval, of_scale, of_units, shown
+from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.log import Cause, Finding, Log, load_log
 from dropspin.comparisons.logs.noise import Regression, regression
 from dropspin.comparisons.logs.other_conventions import in_other_readings, of_lengths, of_quaternions, orders_of_axes
@@ -23,17 +24,10 @@ from dropspin.comparisons.logs.rest import rests
 from dropspin.comparisons.running.arguments import ignore
 from dropspin.scenarios.bodies.inertia import in_numbers
 from dropspin.scenarios.errors import DropspinError
-from dropspin.scenarios.rotations import unrotate
-from dropspin.scenarios.state import UP, Array
+from dropspin.scenarios.state import Array
 
-ALARM = 1e-4
-"""Probability of a finding where there is nothing, of each value."""
-UNIT = 0.05
-"""Largest relative difference from the ratio of two units."""
-LEAST_SCALE, LEAST_DECAY = 5e-4, 0.01
-"""The least relative difference of gravity and the least decay of the spin [1/s] that are findings; engines have a larger damping."""
-LEAST_AT_REST = 0.004
-"""The least relative difference of heights at rest that tells causes apart."""
+LEAST_DECAY = 0.01
+"""The least decay of the spin [1/s] that is a finding; engines have a larger damping."""
 CENTRES = tuple(f"centre of mass, {axis}" for axis in "xyz")
 RATIOS = ("I_x / I_y over the header's", "I_z / I_y over the header's")
 """Names of values."""
@@ -123,7 +117,7 @@ def log_check(recording: Flights | Log | str | Path, on_progress: Callable[[str,
     else:
         flights = log
     drag = regression([positions(flight, with_drag=True) for flight in flights.found])
-    found = [*_of_units(flights), *of_quaternions(flights.log, flights), *of_rates(flights), *of_frames(flights)]
+    found = [*of_units(flights), *of_quaternions(flights.log, flights), *of_rates(flights), *of_frames(flights)]
     values = tuple(_values(flights, drag))
     check = Check(values, tuple(found), tuple(_tosses(flights)), flights)
     if check.reads_the_columns_right:
@@ -135,7 +129,7 @@ def log_check(recording: Flights | Log | str | Path, on_progress: Callable[[str,
     if off:  # the tracked point of a body that turns fast about another point seems not to fly
         found = [finding for finding in found if finding.kind not in ("no flight", "late")]
     found += [Finding("misread", toss=flight.toss.name, frame=frame) for flight in flights.found for frame in flight.misread]
-    found += [*_of_scale(flights, drag), *off, *_of_inertia(flights, drag, known), *of_floor(flights, ALARM)]
+    found += [*of_scale(flights, drag), *off, *_of_inertia(flights, drag, known), *of_floor(flights, ALARM)]
     return replace(check, findings=tuple(found))
 
 
@@ -145,99 +139,6 @@ def _in_another_reading(log: Log) -> tuple[Finding, Flights] | None:
     finding, read, fallen = max(readings, key=lambda reading: sum(map(len, reading[2])))
     flights = flights_of(read, read.header.acceleration) if 2 * len(fallen) >= len(log.tosses) else None
     return None if flights is None else (finding, flights)
-
-
-def _of_units(flights: Flights) -> Iterator[Finding]:
-    """Of accelerations that are along another axis or far from gravity."""
-    header, found = flights.log.header, flights.moving.values[ACCELERATION]
-    if np.linalg.norm(found + header.gravity * UP) <= np.linalg.norm(flights.moving.half_widths(ALARM)[ACCELERATION]):
-        return
-    ratio, recorded = float(np.linalg.norm(found)) / header.gravity, unrotate(np.array(UPRIGHT[header.up]), -found)
-    axis = int(np.argmax(np.abs(recorded)))
-    up = ("-" if recorded[axis] < 0.0 else "") + "xyz"[axis]
-    if up != header.up:
-        yield Finding("up", causes=(Cause("upward axis", keys={"up": up}),))
-    if abs(ratio - 1.0) > UNIT:
-        single = (_length_cause(header, ratio), _rate_cause(flights.log, ratio), _local(ratio * header.gravity))
-        at_rest, error = _lengths_at_rest(flights.log)
-        units = tuple(cause for cause in single if cause.name in ("length unit", "time unit"))
-        allowed = UNIT if units else 4.0 * error + LEAST_AT_REST
-        by_length, by_rate = (not abs(at_rest / expected - 1.0) > allowed for expected in (ratio, 1.0))
-        if by_length or by_rate:
-            causes = _shown(*zip(single, (by_length, by_rate, by_rate), strict=True))
-            yield Finding("unit", ratio * header.gravity, header.gravity, causes=units or causes, rests=at_rest)
-        else:
-            yield from _of_both("unit", flights.log, ratio, at_rest)
-
-
-def _lengths_at_rest(log: Log) -> tuple[float, float]:
-    """The recorded lengths over the true ones, and the relative error, by heights at rest in any unit; NaN if they show it unclearly."""
-    now = LENGTHS[log.header.length_unit]
-    others = ((finding.causes[0].keys.get("length_unit"), read) for finding, read in in_other_readings(log))
-    read_as = [(1.0, log), *((now / LENGTHS[unit], read) for unit, read in others if unit is not None)]
-    scales = [(factor, *rests(read).scale()[:2]) for factor, read in read_as]
-    clear = [(abs(math.log(scale)), factor * scale, error / scale) for factor, scale, error in scales if 0.0 < 4.0 * error < UNIT * scale]
-    return min(clear, default=(0.0, math.nan, math.nan))[1:]
-
-
-def _of_both(kind: str, log: Log, ratio: float, lengths: float) -> Iterator[Finding]:
-    """Of lengths that are wrong beside times or gravity: of the ratio of gravity to the header's, heights at rest show their part."""
-    rate, gravity = _rate_cause(log, ratio / lengths), ratio * log.header.gravity
-    others = (rate,) if rate.name == "time unit" else (rate, _local(gravity / lengths))
-    for causes in ((_length_cause(log.header, lengths),), others):
-        yield Finding(kind, gravity, log.header.gravity, causes=causes, rests=lengths)
-
-
-def _local(gravity: float) -> Cause:
-    return Cause("local gravity", keys={"gravity": float(f"{gravity:.4g}")})
-
-
-def _length_cause(header: Header, ratio: float) -> Cause:
-    """Lengths that are too long by a ratio: that of another unit, or a wrong scale."""
-    for unit, value in LENGTHS.items():
-        if unit != header.length_unit and abs(ratio * value / LENGTHS[header.length_unit] - 1.0) < UNIT:
-            return Cause("length unit", keys={"length_unit": unit})
-    return Cause("length scale", ratio - 1.0, {"length_scale": float(f"{ratio * header.length_scale:.4g}")})
-
-
-def _rate_cause(log: Log, ratio: float) -> Cause:
-    """Accelerations that are too large by a ratio, by another unit of time, or by a wrong rate in the header or in the times."""
-    faster, rate = math.sqrt(ratio), 1.0 / float(np.median(np.concatenate([np.diff(toss.t) for toss in log.tosses])))
-    for unit, value in TIMES.items():
-        if unit != log.header.time_unit and abs(ratio * (TIMES[log.header.time_unit] / value) ** 2 - 1.0) < UNIT:
-            return Cause("time unit", keys={"time_unit": unit})
-    return Cause("rate", faster - 1.0, {"rate": float(f"{rate / faster:.4g}")} if log.header.rate is not None else {})
-
-
-def _falls(flights: Flights, drag: Regression, outside: float = 0.05) -> tuple[float, float]:
-    """The interval that misses gravity with the probability `outside` [m/s²]: without drag, and with it too if it differs from 0."""
-    found = [flights.moving, *([drag] if abs(drag.values[-1]) > drag.half_widths()[-1] else [])]
-    middles, widths = [-one.values[1] for one in found], [one.half_widths(outside)[1] for one in found]
-    return float(np.min(np.subtract(middles, widths))), float(np.max(np.add(middles, widths)))
-
-
-def _of_scale(flights: Flights, drag: Regression) -> Iterator[Finding]:
-    """Of gravity that is a little too large or small, or not vertical."""
-    header, found = flights.log.header, flights.moving
-    x, fall, z = found.values[ACCELERATION].tolist()
-    wide, (low, high) = found.half_widths(ALARM), _falls(flights, drag, ALARM)
-    ratio = -fall / header.gravity
-    if not low <= header.gravity <= high and abs(ratio - 1.0) > LEAST_SCALE:
-        at_rest, spread, _, _ = rests(flights.log).scale()
-        by_length, by_rate = (abs(at_rest - expected) < 4.0 * spread + LEAST_AT_REST for expected in (ratio, 1.0))
-        single = (_length_cause(header, ratio), _rate_cause(flights.log, ratio), _local(-fall))
-        causes = _shown(*zip(single, (by_length, by_rate, by_rate), strict=True))
-        if math.isfinite(at_rest) and not (by_length or by_rate):
-            yield from _of_both("scale", flights.log, ratio, at_rest)
-        else:
-            yield Finding("scale", -fall, header.gravity, causes=causes, rests=at_rest)
-    if math.hypot(x, z) > math.hypot(wide[0], wide[2]):
-        yield Finding("tilt", math.atan2(math.hypot(x, z), -fall), 0.0, causes=(Cause("axes"), Cause("push")))
-
-
-def _shown(*causes: tuple[Cause, bool]) -> tuple[Cause, ...]:
-    """The causes that the frames at rest show, or all if they show none."""
-    return tuple(cause for cause, is_shown in causes if is_shown) or tuple(cause for cause, _ in causes)
 
 
 def _of_offset(flights: Flights, known: Mapping[str, bool]) -> Iterator[Finding]:
@@ -254,7 +155,7 @@ def _of_offset(flights: Flights, known: Mapping[str, bool]) -> Iterator[Finding]
         inertia = {} if isinstance(header.body.inertia, tuple) else {"body.inertia": in_numbers(header.body.inertia_tensor)}
         keys = {"body.center_of_mass": _rounded(header.body.centre + off)} | inertia
         point = {"tracked_point": _rounded(np.asarray(header.tracked_point) - off)}
-        causes = _shown((Cause("centre of mass", keys=keys), by_mass), (Cause("tracked point", keys=point), by_point))
+        causes = shown((Cause("centre of mass", keys=keys), by_mass), (Cause("tracked point", keys=point), by_point))
         opposite = 2.0 * float(np.abs(moved[seen]).max()) if seen.any() else math.nan
         yield Finding("centre of mass", float(np.linalg.norm(off)), 0.0, causes=causes, rests=opposite)
 
@@ -300,7 +201,7 @@ def _orders_that_fit(log: Log, ratios: Array, wide: Array) -> Iterator[Cause]:
 def _values(flights: Flights, drag: Regression) -> Iterator[Value]:
     """The values that flights give, each with its interval or with what it needs."""
     header, found = flights.log.header, flights.moving
-    fall, (low, high) = -float(found.values[1]), _falls(flights, drag)
+    fall, (low, high) = -float(found.values[1]), gravity_interval(flights, drag)
     yield Value("gravity", fall, low, high, "m/s²")
     yield Value("length scale", fall / header.gravity, low / header.gravity, high / header.gravity, "")
     yield from centre_of_mass(flights)

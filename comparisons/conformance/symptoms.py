@@ -108,7 +108,10 @@ def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
         yield held if stays else "the floor does not change the velocity" if passes else above
         return
     before, after = first
-    height = float(case.motion.position[before, 1])
+    height, left = float(case.motion.position[before, 1]), float(case.states.lowest_height[after])
+    if left > allowed_position and not case.motion.velocity[after].any():
+        yield f"the body stops {left:.2g} m above the floor: the engine puts it to sleep, or holds it"
+        return
     if case.impacts:
         times, step = case.motion.t, 2.0 * case.dt
         impact = float(np.interp(case.impacts[0], case.exact.t, case.exact.position[:, 1]))

@@ -250,6 +250,18 @@ def test_body_that_is_held_above_the_floor_has_not_passed_it():
     assert found[0] == "the body stays above the floor: the engine puts it to sleep or holds it, or gravity is too weak"
 
 
+def test_body_that_is_put_to_sleep_in_the_air_has_no_first_contact():
+    """After five steps, in which it has gained no more than the speed below which the engine takes it for one at rest."""
+    [probe] = [one for one in PROBES if one.name == "bouncing ball"]
+    steps = np.minimum(np.arange(1 + probe.rows[1]), 5)
+    rows = np.tile(probe.scene.initial_state, (len(steps), 1))
+    rows[:, 1] += (steps * DT) ** 2 / 2.0 * probe.scene.acceleration[1]
+    rows[:5, 8] = steps[:5] * DT * probe.scene.acceleration[1]
+    found = list(symptoms(probe, Trajectory.from_states(DT * np.arange(len(rows)), rows)))
+    assert found[0] == "the body stops 0.3 m above the floor: the engine puts it to sleep, or holds it"
+    assert not any("contact" in text or "restitution" in text for text in found)
+
+
 def test_restitution_that_is_right_is_not_wrong_by_the_phase_of_the_impact():
     """Semi-implicit Euler with damping, and an impulse of exactly e times the speed."""
     [probe] = [one for one in PROBES if one.name == "lively ball"]

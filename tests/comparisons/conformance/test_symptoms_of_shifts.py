@@ -121,6 +121,23 @@ def test_rows_that_are_late_by_some_steps_are_named(rows, words):
     assert failed(Late(), "time") == {"time": f"the attitude is {words}: it does not belong to the time of its row"}
 
 
+def test_positions_at_the_middle_of_steps_are_late_and_no_explicit_euler():
+    """Both fall as if the velocity were half a step ahead; explicit Euler coasts on time."""
+
+    class Midway(made.Exact):
+        def prepare(self, scene, dt):
+            class Delayed(made.ExactSimulation):
+                def _states(self, steps):
+                    now = super()._states(steps)
+                    now[:, :3] = super()._states(np.maximum(steps - 0.5, 0.0))[:, :3]
+                    return now
+
+            return Delayed(scene, dt)
+
+    late = "position is 0.5 steps late: it does not belong to the time of its row"
+    assert failed(Midway(), "time", "velocity lag") == {"time": late, "velocity lag": late}
+
+
 def test_velocities_that_are_wrong_beside_right_positions_are_no_damping():
     """Too low by 1 % from the first step on, also where the scene has damping."""
 

@@ -223,7 +223,7 @@ def _verify_equal(engine: Engine, what: str, found: Array, expected: Array, mult
     if not (difference <= allowed).all():
         row = int(np.argmin(difference <= allowed))
         of_which = f" of simulation {row + 1} of {len(found)}" if len(found) > 1 else ""
-        is_now, has = (np.array2string(one[row], precision=17) for one in (found, expected))
+        is_now, has = (np.array2string(one[row] if one[row].size > 1 else one[row, 0], precision=17) for one in (found, expected))
         raise BuildMismatch(
             f"{what}{of_which} is {is_now}, the scene has {has}; they differ by {difference[row]:.3g}, {multiple} eps is {allowed[row]:.3g}"
         )

@@ -364,6 +364,17 @@ def test_a_recording_without_free_flight_is_refused() -> None:
         log_check(still)
 
 
+def test_orientations_of_another_time_than_the_positions_are_a_finding() -> None:
+    """The tracked point is 60 mm from the centre of mass, and turns about it by 0.15 rad in the 14 ms of two frames."""
+    header = {"body": BRICK, "tracked_point": [0.06, 0.0, 0.0]}
+    log = made(1, 10, NOISE, offset=(0.06, 0.0, 0.0), durations=(0.3, 0.4), spin=10.0, header=header).log
+    assert log_check(log).findings == ()
+    late = changed(log, orientation=lambda toss: toss.orientation[np.maximum(np.arange(len(toss)) - 2, 0)])
+    found = {finding.kind: finding for finding in log_check(late).findings}
+    assert "departs" in found
+    assert "far beyond the noise of a frame" in sentence(found["departs"])
+
+
 def test_bodies_that_mostly_rest_are_read_as_the_header_says(monkeypatch: pytest.MonkeyPatch) -> None:
     """Smoothed frames at rest may outnumber the falls with one acceleration, and do not fly; those that fall with gravity do."""
     monkeypatch.setattr(falling, "_acceleration", lambda log, down: np.array([0.0, 0.0, -0.1]))

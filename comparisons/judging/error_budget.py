@@ -31,6 +31,7 @@ from dropspin.comparisons.judging.series import (
     SMALLEST_RATIO,
     falls_ever_faster,
     fitted_order,
+    grows_ever_faster,
     is_clear_power,
     most_informative,
     start_of_finest,
@@ -180,7 +181,7 @@ def error_budget(
     orders = (min(posterior.order_lower, order), max(posterior.order_upper, order)) if has_order else (math.nan, math.nan)
     found = ErrorBudget(cause, "approaches a value other than 0", *in_units, order, *orders, fitted)
     if cause == "model":
-        if falls_ever_faster(h, 2.0 * e[-1] - e, small):  # mirrored at the finest error
+        if grows_ever_faster(h, e, small):
             return replace(found, reason="grows faster at each finer time step, and may approach no value")
         return replace(found, reason=found.reason + _power(found))
     return widened(found, found.upper, unit * abs(float(e[-1])), unit * negligible)

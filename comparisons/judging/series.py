@@ -25,6 +25,8 @@ BY_CHANCE = 1e-3
 """Errors within rounding follow a power of the time step if independent errors look like it with less than this probability."""
 NOTICEABLE = 1e-3
 """Share of an error that its change from one time step to the next must exceed to tell its trend."""
+DIVERGING = 0.1
+"""Share of an error by which it must grow for each factor e of the time step, so that it may approach no value; it does as dt^-0.15."""
 TWO_DIGITS = 0.01
 """Logarithms of errors that differ by less than this are equal, because errors near rounding have few digits."""
 
@@ -118,6 +120,15 @@ def falls_ever_faster(h: Array, e: Array, small: Array) -> bool:
     falls = np.diff(sizes) / np.diff(np.log(h))
     is_noticeable = sizes[-2] - sizes[-1] > max(NOTICEABLE * sizes[-1], ABOVE_NOISE * np.hypot(*small[-2:]))
     return bool(is_noticeable and (falls >= 0.0).all() and (np.diff(falls) > 0.0).all())
+
+
+def grows_ever_faster(h: Array, e: Array, small: Array) -> bool:
+    """Whether errors, coarsest first, grow toward finer steps by more for each factor of the step, and by `DIVERGING` of the finest.
+
+    Three errors that change little often grow so by chance, though their limit is known well.
+    """
+    least = DIVERGING * abs(e[-1]) * math.log(h[-2] / h[-1])
+    return bool((e[-1] - e[-2]) * np.sign(e[-1]) > least and falls_ever_faster(h, 2.0 * e[-1] - e, small))  # mirrored at the finest
 
 
 def grows_without_limit(dts: Array, errors: Array, noise: Array, large: float) -> bool:

@@ -164,9 +164,12 @@ def test_error_that_grows_without_bound_approaches_no_value(p, h):
     assert "approaches" not in found.reason
 
 
-@pytest.mark.parametrize(("h", "errors"), [(H, [1.0, 1.0003, 1.0015]), (FIVE, 1.0 + 0.003 / FIVE)])
-def test_model_error_with_a_drift_that_grows_stays_a_model_error(h, errors):
-    assert ds.error_budget(h, errors).cause == "model"
+@pytest.mark.parametrize(
+    ("h", "errors"), [(H, [1.0, 1.0003, 1.0015]), (H, [-1.256e-3, -1.259e-3, -1.264e-3]), (FIVE, 1.0 + 0.003 / FIVE), (FIVE, FIVE**-0.02)]
+)
+def test_model_error_with_a_small_drift_that_grows_approaches_a_value(h, errors):
+    found = ds.error_budget(h, errors)
+    assert (found.cause, found.reason[:27]) == ("model", "approaches a value other th")
 
 
 def test_errors_near_rounding_are_not_called_sampling_noise():

@@ -86,7 +86,11 @@ def run_engine(
 
 
 def motions_from(
-    entry: EngineEntry, starts: Sequence[Scenario], dt: float, on_simulations: OnSimulations = share_progress
+    entry: EngineEntry, starts: Sequence[Scenario], dt: float, alone: Scenario | None, on_simulations: OnSimulations = share_progress
 ) -> list[Trajectory]:
-    """The motions of an engine from other starts of a scene at a time step [s]."""
-    return [recording.motion for recording in record_batch(entry.adapter, starts, dt, on_simulations)]
+    """The motions of an engine from other starts of a scene at a time step [s].
+
+    If the engine steps batches, that from a start that was simulated alone is the first one: a batch may move otherwise.
+    """
+    first = [alone] if alone is not None and entry.adapter.steps_batches else []
+    return [recording.motion for recording in record_batch(entry.adapter, [*first, *starts], dt, on_simulations)]

@@ -35,7 +35,7 @@ from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, divergence
 from dropspin.comparisons.running.engine_entries import engine_entry
 from dropspin.comparisons.running.engine_run import EngineRun, run_engine
-from dropspin.comparisons.running.perturbed_starts import changes_of_metrics, number_of_simulations
+from dropspin.comparisons.running.perturbed_starts import IN_BATCHES, Changes, changes_of_metrics, number_of_simulations
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress
 from dropspin.comparisons.running.start_phases import StartPhase, compare, measure, phases_at
@@ -116,7 +116,7 @@ class EngineStudy:
             run = EngineRun(Claim(entry.label), answer) if isinstance(answer, Breakdown) else answer
         motions = [] if run.motion is None else [run.motion, *run.phases]
         run.breakdown = run.breakdown or timing.breakdown or next(filter(None, map(divergence, motions)), None)
-        cases, changes = [] if run.breakdown else compare(run.phases, phases), []
+        cases, changes = [] if run.breakdown else compare(run.phases, phases), Changes([], {})
         if cases and perturbs:
             before = size + (size > 1)
 
@@ -127,7 +127,9 @@ class EngineStudy:
                 changes = changes_of_metrics(self.own, entry, phases, cases, dt, run.claim.precision, self.processes, on_perturbed)
             except Breakdown as breakdown:
                 run.breakdown, cases = breakdown, []
-        points = measure(self.own, dt, run, cases, changes) if cases else {}
+        points = measure(self.own, dt, run, cases, changes.of_starts) if cases else {}
+        if any(changes.in_batch.get(name, 0.0) > point.tolerance for name, point in points.items()):
+            run.claim = run.claim._replace(limitations=(*run.claim.limitations, IN_BATCHES))
         digest = motion_digest(motions) if motions else ""
         case = Case(scene.name, entry.label, dt, scene.steps(dt))
         return Outcome(case, timing.per_step, replace(run, phases=[]), points, digest), cases

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
+from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.measuring.requirements import starts_in_flight
@@ -27,6 +29,17 @@ PERTURBED_PHASES = 8
 """Start phases from which perturbed motions are simulated. The mean over these changes as that over all phases if they change alike, and
 more if they change at random.
 """
+IN_BATCHES = KnownLimitation(
+    "the motion in a batch is not that of a single simulation; dropspin conform --check batches says where they differ"
+)
+"""It widens no tolerance: perturbed starts are compared with the same start in their batch."""
+
+
+class Changes(NamedTuple):
+    """How much every metric changes, by name: with each set of perturbed starts, and in a batch instead of a single simulation."""
+
+    of_starts: list[Mapping[str, float]]
+    in_batch: Mapping[str, float]
 
 
 def perturbed(scene: Scenario, signs: Array, precision: type) -> Scenario:
@@ -73,8 +86,8 @@ def changes_of_metrics(
     precision: type,
     processes: EngineProcesses,
     on_simulations: Callable[[int], None],
-) -> list[Mapping[str, float]]:
-    """How much every metric changes, by name, with each set of perturbed starts.
+) -> Changes:
+    """How much every metric changes with each set of perturbed starts, and in a batch.
 
     The motions of at most `MOST_ROWS` steps, or of one set, are kept at a time.
 
@@ -95,6 +108,7 @@ def changes_of_metrics(
     phases, cases = phases[::stride], cases[::stride]
     size, signs = len(phases), _signs(own, precision, len(phases))
     before = {metric.name: metric.value_or_nan(cases) for metric in metrics} if signs else {}
+    in_batch = dict(before)
     at_once = max(1, MOST_ROWS // (size * own.scene.steps(dt)))
     if size > 1:  # they roll about their corners: perturbed by eps of single precision they would slip, which is another motion
         precision = np.float64
@@ -102,11 +116,23 @@ def changes_of_metrics(
     def changes(first: int) -> Iterator[Mapping[str, float]]:
         """From some of the perturbations; their motions are dropped when it ends."""
         starts = [perturbed(phase.scene, one, precision) for one in signs[first : first + at_once] for phase in phases]
-        motions = processes.call(entry, motions_from, starts, dt, on_simulations=lambda done, _: on_simulations(first * size + done))
+        alone = own.scene if size == 1 else None  # the motions from several phases are of a batch themselves
+        motions = processes.call(
+            entry,
+            motions_from,
+            starts,
+            dt,
+            alone,
+            on_simulations=lambda done, total: on_simulations(first * size + done - max(total - len(starts), 0)),
+        )
         if isinstance(motions, Breakdown):
             raise motions
+        if len(motions) > len(starts) and not np.array_equal((beside := motions.pop(0)).states, cases[0].motion.states):
+            moved = compare([beside], phases)
+            in_batch.update({metric.name: metric.value_or_nan(moved) for metric in metrics})
         for number in range(0, len(motions), size):
             moved = compare(motions[number : number + size], phases)
-            yield {metric.name: abs(metric.value_or_nan(moved) - before[metric.name]) for metric in metrics}
+            yield {metric.name: abs(metric.value_or_nan(moved) - in_batch[metric.name]) for metric in metrics}
 
-    return list(chain(*map(changes, range(0, len(signs), at_once))))
+    found = list(chain(*map(changes, range(0, len(signs), at_once))))
+    return Changes(found, {name: abs(value - before[name]) for name, value in in_batch.items()})

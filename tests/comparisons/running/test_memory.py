@@ -42,7 +42,7 @@ def test_reason_why_a_metric_is_unresolved_keeps_no_motion():
 @pytest.mark.usefixtures("engine_processes")
 def test_pool_of_processes_keeps_no_motion_that_it_returned():
     with EngineProcesses(FIVE_MINUTES) as processes:
-        motion = weakref.ref(*processes.call(engine_entry("wang"), motions_from, [BALL], 0.01))
+        motion = weakref.ref(*processes.call(engine_entry("wang"), motions_from, [BALL], 0.01, None))
         for _ in range(100):  # the thread that received it may not have dropped it yet
             if motion() is None:
                 break

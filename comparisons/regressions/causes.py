@@ -2,10 +2,10 @@
 
 The errors that a cause has are the differences between the exact solutions of the scene with and without it. A cause must have the errors
 of the scenes in which asymptotic errors fail, and none in the scenes in which they pass. Where an exact solution with the cause is not
-known to the end, or leaves a metric undefined, neither holds.
+known to the end, or leaves a metric undefined, neither holds; scenes in which it is so for all errors that fail are named.
 """
 
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -30,6 +30,8 @@ MOST_STEPS = 20_000
 """Largest number of time steps of the sampled exact solutions."""
 NEAR = 1.3
 """Largest ratio of two sizes of an error that count as near each other before the first iteration."""
+WIDEST = 0.3
+"""Largest width of the interval of an error, relative to the error, from which alone a cause is inferred; a wider one tells no size."""
 ITERATIONS = 3
 """Number of iterations for the size of an error; each reduces its relative error by a factor of about the size."""
 
@@ -49,10 +51,17 @@ class WrongParameter(NamedTuple):
 
 
 class Causes(NamedTuple):
-    """The causes of which each alone explains the errors: wrong parameters, and known faults."""
+    """The causes of which each alone explains the errors: wrong parameters, and known faults.
+
+    Attributes:
+        parameters: The wrong parameters.
+        faults: The known faults.
+        unexamined: For each cause, by its name or message, the scenes whose failed errors could not be compared with those that it has.
+    """
 
     parameters: list[WrongParameter]
     faults: list[FaultModel]
+    unexamined: Mapping[str, Sequence[str]]
 
 
 def causes(results: Results, engine: str) -> Causes:
@@ -67,21 +76,26 @@ def causes(results: Results, engine: str) -> Causes:
     judged = mine[mine["verdict"].isin(["failed", "passed"]) & (mine["cause"] != "unresolved") & mine["lower"].notna()]
     failed = judged[judged["verdict"] == "failed"]
     if failed.empty:
-        return Causes([], [])
+        return Causes([], [], {})
     dt = min(map(float, results.provenance["asked"]["dts"]))
     scenes = [(results.scenes[str(name)], rows.to_dict("records")) for name, rows in judged.groupby("scene")]
     scenes.sort(key=lambda scene: all(row["verdict"] != "failed" for row in scene[1]))  # those that fail exclude most causes
     widths = (failed["upper"] - failed["lower"]) / failed["value"].abs()
     narrowest = failed.loc[widths.sort_values().index].groupby("scene", sort=False)  # first the scene whose sizes are the most precise
 
+    unexamined: dict[str, list[str]] = {}
+
     def holds(fault: FaultModel) -> bool:
-        count = 0
+        widths: list[float] = []
+        left = []
         for scene, rows in scenes:
-            explained = _explained(scene, fault, rows, dt)
-            if explained is None:
+            found = _explained(scene, fault, rows, dt)
+            if found is None:
                 return False
-            count += explained
-        return count > 0
+            widths += found[0]
+            left += [scene.name] * (found[1] == 0 and any(row["verdict"] == "failed" for row in rows))
+        unexamined.setdefault(fault.message, left)
+        return len(widths) > 1 or min(widths, default=np.inf) <= WIDEST
 
     parameters = []
     for parameter in PARAMETERS:
@@ -92,7 +106,7 @@ def causes(results: Results, engine: str) -> Causes:
     for fault in FAULT_MODELS:
         if fault.about != "start" and holds(fault):
             faults.setdefault((fault.reported, *(_simulated(fault, scene) for scene, _ in scenes)), fault)
-    return Causes(parameters, list(faults.values()))
+    return Causes(parameters, list(faults.values()), unexamined)
 
 
 def _sizes(scene: Scenario, parameter: Parameter, failed: pd.DataFrame, dt: float) -> Iterator[float]:
@@ -120,26 +134,33 @@ def _sizes(scene: Scenario, parameter: Parameter, failed: pd.DataFrame, dt: floa
             yield size
 
 
-def _explained(scene: Scenario, fault: FaultModel, rows: list[dict[Hashable, Any]], dt: float) -> int | None:
-    """How many of the failed asymptotic errors of a scene a cause has; None if it has another error than one of those that it defines."""
+def _explained(scene: Scenario, fault: FaultModel, rows: list[dict[Hashable, Any]], dt: float) -> tuple[list[float], int] | None:
+    """The relative widths of the failed asymptotic errors of a scene that a cause has, and how many of them could be compared.
+
+    None if it has another error than one of those that it defines.
+    """
     fine = _caused(scene, fault, 0.5 * dt)
     halves = [_caused(scene, fault, dt, start) for start in (0.0, 0.5)]  # of its samples: the last one before an impact is in one alone
-    count = 0
+    widths, compared = [], 0
     for row in rows:
         metric = row["metric"]
         caused = fine.error(metric)
         if np.isnan(caused):
             continue
         # With and without the cause, the sampling has an error, each half as large as that of a half.
-        sampling = max(abs(caused - half.error(metric)) + abs(half.sampled(metric)) for half in halves) + negligible(scene, row["unit"])
+        sampling = max(abs(caused - half.error(metric)) + abs(half.sampled(metric)) for half in halves)
+        if row["cause"] != "rounding":  # whose interval has all that rounding may hide
+            sampling += negligible(scene, row["unit"])
         lower = row["lower"] - sampling
         if not fine.is_whole:  # the largest error so far is a lower bound of the whole one
             lower, caused = (-np.inf, -np.inf if METRICS[metric].signed else caused)
         has_none = row["verdict"] == "failed" and abs(caused) <= sampling  # as it has of an error whose interval begins at 0
         if has_none or not lower <= caused <= row["upper"] + sampling:
             return None
-        count += fine.is_whole and row["verdict"] == "failed"
-    return count
+        if row["verdict"] == "failed":
+            compared += 1
+            widths += [(row["upper"] - row["lower"]) / abs(row["value"])] * fine.is_whole
+    return widths, compared
 
 
 def _with(parameter: Parameter, size: float) -> FaultModel:

@@ -10,7 +10,7 @@ from dropspin.comparisons.judging.convergence import STUDIES
 from dropspin.comparisons.judging.verdicts import FAILURES
 from dropspin.comparisons.measuring.symmetries import kind_of
 from dropspin.comparisons.regressions.causes import WrongParameter, causes
-from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.results.results import MOST_NAMES, Results
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.reports.document import Paragraph, Part, Sentences
 from dropspin.reports.stories.numbers import Row, bound, explained_by, formatted, grouped, in_ms, listed, step, subject, word
@@ -114,10 +114,15 @@ def failure_parts(results: Results, failures: Sequence[Failure], baseline: str |
 
 def _consistent_with(results: Results, engine: str) -> list[str]:
     """A sentence on wrong parameters and faults, each of which alone explains the asymptotic errors of an engine; empty without them."""
-    parameters, faults = causes(results, engine)
-    wrong = " or ".join(dict.fromkeys(map(_described, parameters)))
-    listed = "; or ".join(filter(None, [wrong, *(fault.message for fault in faults)]))
-    return [f"Possible cause of the asymptotic errors of {engine}: {listed}."] if listed else []
+    parameters, faults, unexamined = causes(results, engine)
+
+    def where(cause: str) -> str:
+        left = unexamined[cause]
+        return f" (not examined in {listed(left) if len(left) <= MOST_NAMES else counted(len(left), 'failing scene')})" if left else ""
+
+    wrong = " or ".join(dict.fromkeys(f"{_described(one)}{where(one.parameter.name)}" for one in parameters))
+    listed_causes = "; or ".join(filter(None, [wrong, *(f"{fault.message}{where(fault.message)}" for fault in faults)]))
+    return [f"Possible cause of the asymptotic errors of {engine}: {listed_causes}."] if listed_causes else []
 
 
 def settings_that_explain(results: Results, engine: str) -> Iterator[str]:

@@ -16,6 +16,9 @@ from dropspin.comparisons.measuring.metric import Metric
 from dropspin.comparisons.measuring.tolerances import negligible
 from dropspin.scenarios import Scenario, Truth
 
+OF_BOUND = "reason of the bound: "
+"""Before the reason of an expectation that fails: what the bound allows for, which need not be what is wrong."""
+
 
 def judge(
     scene: Scenario, truth: Truth | None, claim: Claim, metric: Metric, point: SeriesPoint, convergence: Convergence | None = None
@@ -46,7 +49,8 @@ def judge(
     value, unresolved = point.average.value, point.unresolved
     expected = compared_with_expectations(scene, claim.label, point.dt, metric, value)
     verdict, basis, lower, upper = expected.verdict, expected.basis, expected.lower, expected.upper
-    reason = joined(str(unresolved or ""), expected.reason)
+    prefix = OF_BOUND if expected.reason and verdict == "failed" else ""
+    reason = joined(str(unresolved or ""), prefix + expected.reason)
     if math.isnan(value) and not unresolved:
         verdict, reason = "failed", reason or "the event that it measures did not occur"
     if isinstance(unresolved, BeyondHorizon) and verdict == "measured":

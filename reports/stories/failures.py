@@ -168,7 +168,7 @@ def what_fails(row: Row) -> str:
     limits = bound(row["lower"], row["upper"])
     expected = f", {'95 % interval' if row['kind'] in STUDIES else 'expected'} {limits}" if limits else ""
     value = "undefined" if math.isnan(row["value"]) else formatted(row["value"])
-    return f"{name} is {value}{expected}: {row['reason']}"
+    return f"{name} is {value}{expected}{':' if row['kind'] in STUDIES else ';'} {row['reason']}"
 
 
 def reproduce(results: Results, row: Row, baseline: str | None = None) -> str:

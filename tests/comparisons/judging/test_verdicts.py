@@ -176,7 +176,7 @@ def test_known_limitation_excuses_failures_of_its_metric_and_size_only():
     def excused(value, metric="energy_error"):
         return judge(scene, None, claim, METRICS[metric], SeriesPoint(1e-3, 1000, Average(*np.full((3, 1), value)), None, 0.0))
 
-    assert (excused(-0.02).verdict, excused(0.02).reason) == ("limited", "contacts slip; too large")
+    assert (excused(-0.02).verdict, excused(0.02).reason) == ("limited", "contacts slip; reason of the bound: too large")
     assert [excused(0.021).verdict, excused(math.nan).verdict, excused(0.01, "penetration").verdict] == ["failed"] * 3
     assert (excused(1e-4).verdict, excused(1e-4).reason) == ("passed", "too large")
     uncertain = Convergence(ErrorBudget("model", "extrapolated", 0.021, 0.0195, 0.0225), 1e-3)

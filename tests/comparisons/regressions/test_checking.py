@@ -225,7 +225,7 @@ def test_known_failures_do_not_fail_until_they_get_worse():
     checked = check(found, known)
     assert checked.results.exit_code() == 0
     [row] = checked.results.table.query("verdict == 'known'").to_dict("records")
-    assert row["reason"] == "accepted as a known failure; no contact is that stiff"
+    assert row["reason"] == "accepted as a known failure; reason of the bound: no contact is that stiff"
     worse = replace(found, table=found.table.assign(value=found.table["value"].where(found.table["metric"] != "penetration", 0.5)))
     assert check(worse, known).results.exit_code() == 1
     assert accept(found, known, "again", TODAY)[0].results["known_failure"].any()

@@ -68,7 +68,7 @@ def test_a_failed_expectation_is_reported_with_the_command_that_reproduces_it(tm
     assert done.returncode == 1
     output = done.stdout.replace("\n", " ")
     assert "✗ my scene · mujoco · 0.00123457 s: penetration is " in output
-    assert ", expected ≤ 1e-09: no engine is that stiff. " in output
+    assert ", expected ≤ 1e-09; reason of the bound: no engine is that stiff. " in output
     assert f"Reproduce: dropspin {shlex.join(command)} -o out/again" in output
     assert "1 of 1 check fails." in output
 

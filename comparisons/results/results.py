@@ -193,10 +193,10 @@ class Results:
     def _metric_of_findings(self, rows: pd.DataFrame) -> str:
         """The metric of the largest error, relative to its scale, among those that set a status; empty if there is none.
 
-        An error that fails at another time step, or as dt → 0 alone, is one of them.
+        An error that fails at another time step, or as dt → 0 alone, is one of them, however small it is.
         """
         failed = are_among(rows, self.table[self.table["verdict"].isin(FAILURES)], ["scene", "engine", "metric"])
-        findings = rows[(failed | rows["verdict"].isin(["known", "limited"])) & (rows["value"].abs() > SMALLEST_STATED)]
+        findings = rows[failed | (rows["verdict"].isin(["known", "limited"]) & (rows["value"].abs() > SMALLEST_STATED))]
         findings = findings[~findings["metric"].isin([*JUMPING, *ARTEFACTS, *PARTS])]
         if findings.empty:
             return ""

@@ -66,13 +66,15 @@ def test_small_error_is_not_shown_of_an_engine_that_fails_in_another_metric(core
     assert after.sizes["wang"] == before.sizes["wang"]
 
 
-def test_error_that_fails_as_dt_vanishes_alone_is_the_one_that_is_shown(core):
+@pytest.mark.parametrize(("size", "shown_as"), [(0.05, "5.0"), (2e-5, "2.0e-3")])
+def test_error_that_fails_as_dt_vanishes_alone_is_the_one_that_is_shown(core, size, shown_as):
+    """However small, in a scene without a larger fault."""
     table, scene = core.table.copy(), "drop-ball-backspin"
     mine = (table["scene"] == scene) & (table["engine"] == "mujoco") & (table["metric"] == "energy_error")
     table.loc[mine & (table["kind"] == "asymptotic_error"), "verdict"] = "failed"
-    table.loc[mine & (table["dt"] == 1e-3), "value"] = 0.05
+    table.loc[mine & (table["dt"] == 1e-3), "value"] = size
     shown = leading_errors(replace(core, table=table))[scene]
-    assert (shown.metric, shown.sizes["mujoco"]) == ("energy_error", "5.0")
+    assert (shown.metric, shown.sizes["mujoco"]) == ("energy_error", shown_as)
 
 
 def test_scenes_that_every_engine_declines_are_counted():

@@ -62,6 +62,7 @@ WIDEST_ORDER = 2.0
 
 SLOW = f"changes more slowly than dt^{ORDERS[0]:g}, too slowly to be extrapolated; much finer time steps are needed"
 EARLY = "falls faster at each finer time step, as an error near its largest possible value does; finer time steps are needed"
+DIVERGES = "grows faster at each finer time step, and may approach no value"
 
 
 @dataclass(frozen=True)
@@ -181,9 +182,7 @@ def error_budget(
     orders = (min(posterior.order_lower, order), max(posterior.order_upper, order)) if has_order else (math.nan, math.nan)
     found = ErrorBudget(cause, "approaches a value other than 0", *in_units, order, *orders, fitted)
     if cause == "model":
-        if grows_ever_faster(h, e, small):
-            return replace(found, reason="grows faster at each finer time step, and may approach no value")
-        return replace(found, reason=found.reason + _power(found))
+        return replace(found, reason=DIVERGES if grows_ever_faster(h, e, small) else found.reason + _power(found))
     return widened(found, found.upper, unit * abs(float(e[-1])), unit * negligible)
 
 

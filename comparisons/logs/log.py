@@ -26,8 +26,15 @@ from dropspin.scenarios.validation import validated
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "recordings"
 NEAR_UNIT = 0.05
 """Largest difference from 1 of the length of a quaternion; two digits round it by 0.01."""
-MOVES = 0.1
-"""Share of a toss's largest step from which a body moves: below, rounding may repeat a row."""
+MOVES, USUAL, FINEST, ROUNDED = 0.1, 0.9, 10.0, 1e-9
+"""Share of a toss's usual step, a quantile of its steps other than 0, and multiple of the least difference of two steps (other than errors
+of floating point, relative to the usual step) from which on a body moves: below, rounding of the file may repeat a row. Longer steps, which
+catch up after a freeze or lead to an outlier, are few.
+"""
+NOISY, SMOOTHEST, ENOUGH = 0.01, 0.1, 9
+"""Fourth differences of positions or quaternions, over the usual step, from which on no two rows are equal, even at rest: a quantile of
+more than so many, which impacts do not raise.
+"""
 UNSURE = 0.5
 """Range of the steps between frames, over the usual step, from which on a long step does not show that frames are missing."""
 OTHER_RATE = 2e-3
@@ -83,9 +90,9 @@ class Finding:
     """An error of a recording or its header.
 
     Attributes:
-        kind: The kind, such as `scale`; `dropspin.reports.stories.log_findings` describes each. Four kinds concern the rows of the file:
-            `repeated` (a row repeats the previous one while the body moves), `gap` (frames are missing), `jitter` (the times are uneven)
-            and `rate` (the frame rate differs from that of the header).
+        kind: The kind, such as `scale`; `dropspin.reports.stories.log_findings` describes each. These kinds concern the rows of the file:
+            `repeated` (rows repeat the previous one while the body moves), `repeated position` and `repeated orientation` (that alone),
+            `gap` (frames are missing), `jitter` (the times are uneven) and `rate` (the frame rate differs from that of the header).
         value: The measured value, in SI units.
         expected: The value according to the header, or the usual value, in SI units.
         toss: The name of the toss; empty for the whole recording.
@@ -157,8 +164,10 @@ def load_log(recording: str | Path) -> Log:
     if "t" not in columns and header.rate is None:
         raise DropspinError(f"{given}: neither a column t nor the key rate says when the frames were taken; give one.")
     labels, first, index = np.unique(names, return_index=True, return_inverse=True)
-    tosses = [_toss(where, header, str(labels[number]), columns, np.flatnonzero(index == number)) for number in np.argsort(first)]
-    return Log(header, tuple(tosses), given, tuple(_irregularities(header, tosses)))
+    parts = {str(labels[number]): np.flatnonzero(index == number) for number in np.argsort(first)}
+    tosses = [_toss(where, header, name, columns, rows) for name, rows in parts.items()]
+    poses = np.column_stack([columns[column] for column in (*POSITION, *ORIENTATION)])
+    return Log(header, tuple(tosses), given, tuple(_irregularities(header, tosses, [poses[rows] for rows in parts.values()])))
 
 
 def _toss(where: str, header: Header, name: str, columns: dict[str, Array], rows: NDArray[np.intp]) -> Toss:
@@ -197,24 +206,52 @@ def _without_jumps(quaternions: Array) -> Array:
     return quaternions * np.cumprod(np.concatenate([[1.0], signs]))[:, None]
 
 
-def _irregularities(header: Header, tosses: list[Toss]) -> Iterator[Finding]:
-    """What the rows and the times show; times that follow from the rate of the header are even."""
-    for toss in tosses:
-        yield from _repeated(toss)
+def _irregularities(header: Header, tosses: list[Toss], poses: list[Array]) -> Iterator[Finding]:
+    """What the rows, with poses as in the file, and the times show; times that follow from the rate of the header are even."""
+    for toss, rows in zip(tosses, poses, strict=True):
+        yield from _repeated(toss.name, rows)
         yield from _uneven(toss)
     rate = 1.0 / float(np.median(np.concatenate([np.diff(toss.t) for toss in tosses])))
     if header.rate is not None and abs(rate / header.rate - 1.0) > OTHER_RATE:
         yield Finding("rate", rate, header.rate, causes=(Cause("times"), Cause("rate of the header", keys={"rate": rate})))
 
 
-def _repeated(toss: Toss) -> Iterator[Finding]:
-    """Runs of equal rows between frames in which the body moves."""
-    steps = length(np.diff(toss.position, axis=0))
-    equal = (steps == 0.0) & (np.diff(toss.orientation, axis=0) == 0.0).all(axis=1)
-    moves = steps > MOVES * steps.max()
-    for begin, end in np.flatnonzero(np.diff(np.pad(equal, 1))).reshape(-1, 2):
-        if begin > 0 and end < len(steps) and moves[begin - 1] and moves[end]:
-            yield Finding("repeated", float(end - begin), 0.0, toss.name, int(begin) + 1)
+def _repeated(toss: str, rows: Array) -> Iterator[Finding]:
+    """Rows (n, 7) that repeat the previous one while the body moves, or of which the position or the orientation alone does.
+
+    Positions decide whether the body moves. In rows without noise, it may stop at once, or slide without turning.
+    """
+    position, orientation = np.diff(rows[:, :3], axis=0), np.diff(_without_jumps(rows[:, 3:]), axis=0)
+    (moves, noisy), (turns, turns_noisily) = _moving(position), _moving(orientation)
+    stays, keeps = ~position.any(axis=1), ~orientation.any(axis=1)
+    for kind, equal, steps, goes, ends in (
+        ("repeated", stays & keeps, position, moves, noisy),
+        ("repeated position", stays & turns & noisy, position, moves, True),
+        ("repeated orientation", keeps & moves & turns_noisily, orientation, turns, True),
+    ):
+        edges = np.flatnonzero(np.diff(np.pad(equal, 1))).reshape(-1, 2).tolist()
+        runs = [(begin, end) for begin, end in edges if _is_frozen(begin, end, steps, goes, ends)]
+        if runs:
+            yield Finding(kind, float(sum(end - begin for begin, end in runs)), 0.0, toss, runs[0][0] + 1)
+
+
+def _moving(steps: Array) -> tuple[NDArray[np.bool_], bool]:
+    """In which steps, shape (n, k), a body moves by more than rounding explains, and whether noise makes all rows differ."""
+    sizes = length(steps)
+    if not sizes.any():
+        return sizes > 0.0, False
+    usual, changes = np.quantile(sizes[sizes > 0.0], USUAL), np.abs(np.diff(steps, axis=0))
+    finest = FINEST * changes[changes > ROUNDED * usual].min(initial=usual)
+    rough = length(np.diff(steps[sizes > 0.0], n=3, axis=0))
+    return sizes > max(MOVES * usual, finest), len(rough) > ENOUGH and bool(np.quantile(rough, SMOOTHEST) > max(NOISY * usual, finest))
+
+
+def _is_frozen(begin: int, end: int, steps: Array, moves: NDArray[np.bool_], ends: bool) -> bool:
+    """Whether steps that are 0 are beside those of a motion, at the ends of a toss too. One alone may be between a fall and a rebound."""
+    beside = [row for row in (begin - 1, end) if 0 <= row < len(steps)]
+    if len(beside) < 2:
+        return ends and bool(beside) and bool(moves[beside].all())
+    return bool(moves[beside].all()) and (end - begin > 1 or float(steps[begin - 1] @ steps[end]) > 0.0)
 
 
 def _uneven(toss: Toss) -> Iterator[Finding]:

@@ -158,22 +158,23 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
         times_are_right = _residual(flights, equal_steps=False) <= BETTER * _residual(flights, equal_steps=True)
         irregularities = tuple(finding for finding in irregularities if finding.kind != "jitter" or not times_are_right)
     yield from irregularities
-    noise, mid_air, flown = noise_of(flights.log), _in_mid_air(flights), {flight.toss.name for flight in flights.found}
+    held, flown = {one.toss: one.frame for one in irregularities if "repeated" in one.kind}, {flight.toss.name for flight in flights.found}
+    noise, mid_air = noise_of(flights.log), {name: height for name, height in _in_mid_air(flights).items() if name not in held}
     for toss in flights.log.tosses:
-        if toss.name not in flown:
+        if toss.name not in flown | held.keys():
             yield Finding("no flight", 0.0, window_size(toss, noise, flights.moving.values[ACCELERATION]), toss.name)
     for flight, weight in zip(flights.found, flights.moving.weights, strict=True):
         own = flights.moving.noise.of_weight(min(weight, 1.0))
         for part in (flight.backwards(), flight):
             missing = _interrupted(part, flights.moving.values, own, by_bad_frames=False)
             bad = 0 if missing else _interrupted(part, flights.moving.values, own, by_bad_frames=True)
-            if missing or bad:
-                frame = flight.end + 1 if part is flight else flight.first - 1 - bad
+            frame = flight.end + 1 if part is flight else flight.first - 1 - bad
+            if (missing or bad) and held.get(flight.toss.name) != frame:
                 yield Finding("frame dropped" if missing else "bad frame", missing or bad, 0.0, flight.toss.name, frame)
             elif part is flight and flight.toss.name in mid_air:
                 causes = (Cause("frames missing"), Cause("touched"))
                 yield Finding("mid-air", mid_air[flight.toss.name], 0.0, flight.toss.name, flight.end - 1, causes)
-            elif part is not flight and flight.first > 2:
+            elif part is not flight and flight.first > 2 and flight.toss.name not in held:
                 yield Finding("late", flight.first, 0.0, flight.toss.name, flight.first, (Cause("held"), Cause("earlier impact")))
 
 

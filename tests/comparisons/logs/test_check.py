@@ -608,6 +608,15 @@ def test_a_bad_frame_is_named_and_not_a_late_flight() -> None:
     assert (found.kind, found.toss, found.frame, found.value) == ("bad frame", log.tosses[3].name, 12, 1.0)
 
 
+def test_frozen_rows_are_the_only_finding_of_a_toss_whose_flight_they_cut() -> None:
+    log = made(1, 10, NOISE, durations=(0.3, 0.4), header={"body": CUBE}).log
+    frozen = replace(replace_rows(log.tosses[3], np.maximum(np.arange(len(log.tosses[3])), 20)), t=log.tosses[3].t)
+    fact = Finding("repeated", 20.0, 0.0, frozen.name, 1)
+    found = only(log_check(replace(log, tosses=(*log.tosses[:3], frozen, *log.tosses[4:]), irregularities=(fact,))))
+    assert found == fact
+    assert sentence(found).startswith("Toss 3, from frame 1 on: number of rows that repeat the previous row while the body moves: 20.")
+
+
 def test_bodies_that_fly_below_the_floor_are_a_finding_without_rests() -> None:
     log = made(1, 5, NOISE, header={"body": CUBE, "floor": {"restitution": 0.3, "friction": 0.3}}).log
     found = only(log_check(changed(log, position=lambda toss: toss.position - [0.0, 3.0, 0.0])))

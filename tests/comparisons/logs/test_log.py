@@ -373,6 +373,44 @@ def test_repeated_rows_missing_frames_uneven_times_and_another_rate_are_facts(tm
     ]
 
 
+NOISE = dict(zip(POSE, 2e-4 * np.random.default_rng(3).normal(size=(len(POSE), FRAMES)), strict=True))
+NOISY = {name: values + NOISE[name] for name, values in POSE.items() if name != "t"}
+STILL = np.minimum(np.arange(FRAMES), 20)
+"""Rows of which the first 21 are of a motion that ends there."""
+
+
+@pytest.mark.parametrize(
+    ("first", "end", "columns", "fact"),
+    [
+        (10, 24, "xyzq", ("repeated", "1", 11, 13.0, 0.0)),
+        (0, 12, "xyzq", ("repeated", "1", 1, 11.0, 0.0)),
+        (30, FRAMES, "xyzq", ("repeated", "1", 31, 9.0, 0.0)),
+        (20, 22, "xyz", ("repeated position", "1", 21, 1.0, 0.0)),
+        (0, 2, "q", ("repeated orientation", "1", 1, 1.0, 0.0)),
+    ],
+)
+def test_frozen_rows_are_facts_however_long_and_wherever_they_are(tmp_path, first, end, columns, fact):
+    rows = np.arange(FRAMES)
+    held = np.where((rows >= first) & (rows < end), first, rows)
+    given = {name: values[held] if name[0] in columns else values for name, values in NOISY.items()}
+    assert facts(load_log(written(tmp_path, given, {"rate": RATE}))) == [fact]
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {name: values[STILL] for name, values in POSE.items()},
+        {name: values[STILL] + NOISE[name] for name, values in POSE.items()},
+        {name: np.round(values, 2 if name in "xyz" else 3) for name, values in (NOISY | {"x": 0.2 * T, "z": 0.1 * T}).items()},
+        {name: values[STILL] if name[0] == "q" else values for name, values in POSE.items()},
+    ],
+    ids=["stops at once", "rests with noise", "rounded to 1 cm", "stops turning"],
+)
+def test_rest_and_rounding_are_no_frozen_rows(tmp_path, columns):
+    columns = {name: values for name, values in columns.items() if name != "t"}
+    assert facts(load_log(written(tmp_path, columns, {"rate": RATE}))) == []
+
+
 def test_body_at_rest_in_rounded_rows_is_no_fact(tmp_path):
     """Rounded to 1 mm and 1 ms at 100 Hz, with a second of rest."""
     still = {name: np.concatenate([values, np.full(100, values[-1])]) for name, values in POSE.items()}

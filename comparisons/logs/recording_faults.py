@@ -159,7 +159,9 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
         irregularities = tuple(finding for finding in irregularities if finding.kind != "jitter" or not times_are_right)
     yield from irregularities
     held, flown = {one.toss: one.frame for one in irregularities if "repeated" in one.kind}, {flight.toss.name for flight in flights.found}
-    noise, mid_air = noise_of(flights.log), {name: height for name, height in _in_mid_air(flights).items() if name not in held}
+    uneven = any(finding.kind == "jitter" for finding in irregularities)  # of which frames seem off their flight
+    above = {} if uneven else _in_mid_air(flights)
+    noise, mid_air = noise_of(flights.log), {name: height for name, height in above.items() if name not in held}
     for toss in flights.log.tosses:
         if toss.name not in flown | held.keys():
             yield Finding("no flight", 0.0, window_size(toss, noise, flights.moving.values[ACCELERATION]), toss.name)
@@ -169,8 +171,9 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
             missing = _interrupted(part, flights.moving.values, own, by_bad_frames=False)
             bad = 0 if missing else _interrupted(part, flights.moving.values, own, by_bad_frames=True)
             frame = flight.end + 1 if part is flight else flight.first - 1 - bad
-            if (missing or bad) and held.get(flight.toss.name) != frame:
-                yield Finding("frame dropped" if missing else "bad frame", missing or bad, 0.0, flight.toss.name, frame)
+            if missing or bad:
+                if held.get(flight.toss.name) != frame and (missing or not uneven):
+                    yield Finding("frame dropped" if missing else "bad frame", missing or bad, 0.0, flight.toss.name, frame)
             elif part is flight and flight.toss.name in mid_air:
                 causes = (Cause("frames missing"), Cause("touched"))
                 yield Finding("mid-air", mid_air[flight.toss.name], 0.0, flight.toss.name, flight.end - 1, causes)

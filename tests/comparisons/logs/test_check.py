@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.tosses import BRICK, CUBE, made, turned
+from support.tosses import BRICK, CUBE, Made, made, turned
 
 from dropspin.comparisons.logs import check as checks
 from dropspin.comparisons.logs import falling
@@ -15,7 +15,7 @@ from dropspin.comparisons.logs.flights import Flights, flights_of, heights
 from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.log import Finding, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression
-from dropspin.comparisons.logs.recording_faults import of_frames, of_rates, ratios_of_rates
+from dropspin.comparisons.logs.recording_faults import _in_mid_air, of_frames, of_rates, ratios_of_rates
 from dropspin.reports.stories.log_findings import corrections, sentence
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
@@ -236,15 +236,33 @@ def test_missing_frames_are_named_with_their_place(count: int) -> None:
     assert "wrong: 1. Toss 3: number of frames missing before frame 30" in corrections("toss.toml", [found])[0]
 
 
-def test_a_flight_that_ends_above_the_floor_is_named_unless_most_do() -> None:
-    """The body strikes the floor; of one toss all frames from 30 on until after the impact are missing, more than its flight has."""
-    recording = made(1, 5, NOISE, rate=240.0, durations=(0.3, 0.35), header={"body": CUBE, "floor": {"restitution": 0.3, "friction": 0.3}})
+def striking_floor(count: int, **others: Any) -> tuple[Made, Log]:
+    """Tosses of a cube, and these with heights at which it strikes the floor."""
+    header = {"body": CUBE, "floor": {"restitution": 0.3, "friction": 0.3}}
+    recording = made(1, count, NOISE, rate=240.0, durations=(0.3, 0.35), header=header, **others)
     body, tosses = recording.log.header.body, []
     for toss, exact, impact in zip(recording.log.tosses, recording.exact, recording.impacts, strict=True):
         hit = exact(impact)
         toss.position[:, 1] += np.abs(rotate(hit[3:7], np.diag(body.half_extents))[:, 1]).sum() - hit[1]
         tosses.append(toss)
-    sound_one = replace(recording.log, tosses=tuple(tosses))
+    return recording, replace(recording.log, tosses=tuple(tosses))
+
+
+def test_a_wrong_point_and_uneven_times_explain_flights_that_seem_to_end_in_mid_air() -> None:
+    check = log_check(striking_floor(6, offset=(0.06, 0.02, 0.04))[1])
+    assert _in_mid_air(check.flights)
+    assert only(check).kind == "centre of mass"
+    rng, fact = np.random.default_rng(5), Finding("jitter", 0.006, 1 / 240, "0", 3)
+    log = replace(striking_floor(6)[1], irregularities=(fact,))
+    uneven = changed(log, t=lambda toss: toss.t + np.concatenate([[0.0], rng.uniform(-1e-3, 1e-3, len(toss) - 1)]))
+    uneven.tosses[3].position[12] += [0.03, 0.0, 0.0]
+    assert log_check(uneven).findings == (fact,)
+
+
+def test_a_flight_that_ends_above_the_floor_is_named_unless_most_do() -> None:
+    """The body strikes the floor; of one toss all frames from 30 on until after the impact are missing, more than its flight has."""
+    recording, sound_one = striking_floor(5)
+    tosses = sound_one.tosses
     assert log_check(sound_one).findings == ()
     kept = np.delete(np.arange(len(tosses[3])), np.arange(30, int(recording.impacts[3] * 240.0) + 2))
     cut = replace(replace_rows(tosses[3], kept), t=tosses[3].t[: len(kept)])

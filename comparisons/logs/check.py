@@ -125,7 +125,7 @@ def log_check(recording: Flights | Log | str | Path, on_progress: Callable[[str,
     if check.reads_the_columns_right:
         check = replace(check, findings=(*found, *of_lengths(flights.log)))
     if not check.reads_the_columns_right:  # heights are not known either
-        return replace(check, findings=tuple(finding for finding in check.findings if finding.kind != "mid-air"))
+        return replace(check, findings=tuple(one for one in check.findings if one.kind not in ("mid-air", "moved again")))
     known = {value.name: value.is_identifiable for value in values}
     off = list(_of_offset(flights, known))
     if off:  # the tracked point of a body that turns fast about another point seems not to fly

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from dropspin.comparisons.logs.afterwards import Afterwards, moved_again
 from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, Flight, departures, falls, grown, positions
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.log import Log, Toss
@@ -108,13 +109,26 @@ class Flights:
         """Ratios of inertia, and the rate at which the spin decays [1/s]."""
         return _turning(self.rotations, ignore, with_decay=True)
 
+    @cached_property
+    def afterwards(self) -> list[Afterwards]:
+        """What follows each flight; its centre of mass is the header's along axes that flights do not show."""
+        values, white = self.moving.values.copy(), (self.moving.noise.white, self.turning.noise.white)
+        values[OFFSET] = np.where(self.show_offset, values[OFFSET], self.log.header.tracked_from_centre)
+        return [Afterwards(rotor, values, white, self.log.header.body) for rotor in self.rotations]
+
+    @cached_property
+    def moved_again(self) -> list[int | None]:
+        """From which frame on the body is moved or thrown again after each flight, if it is."""
+        return list(map(moved_again, self.afterwards))
+
     def starts(self) -> list[Start]:
-        """The state at the end of each flight, by the header's gravity and centre of mass."""
+        """The state at the end of each flight, by the header's gravity and centre of mass; tosses end where the body is moved again."""
         header = self.log.header
         known = np.concatenate([header.acceleration, header.tracked_from_centre])
         each = zip(self.rotations, self.moving.weights, self.turning.weights, strict=True)
         position, orientation = self.moving.noise, self.turning.noise
-        return [_start(rotor, known, position.of_weight(moved), orientation.of_weight(turned)) for rotor, moved, turned in each]
+        starts = [_start(rotor, known, position.of_weight(moved), orientation.of_weight(turned)) for rotor, moved, turned in each]
+        return [replace(start, toss=start.toss.until(end)) for start, end in zip(starts, self.moved_again, strict=True)]
 
 
 def _start(rotor: Rotation, known: Array, position_noise: Noise, orientation_noise: Noise) -> Start:

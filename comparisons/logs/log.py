@@ -64,6 +64,10 @@ class Toss:
     def __len__(self) -> int:
         return len(self.t)
 
+    def until(self, end: int | None) -> "Toss":
+        """Its poses before a frame."""
+        return Toss(self.name, self.t[:end], self.position[:end], self.orientation[:end])
+
     @cached_property
     def time_step(self) -> float:
         """The median time between two frames [s]."""

@@ -165,7 +165,9 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
     for toss in flights.log.tosses:
         if toss.name not in flown | held.keys():
             yield Finding("no flight", 0.0, window_size(toss, noise, flights.moving.values[ACCELERATION]), toss.name)
-    for flight, weight in zip(flights.found, flights.moving.weights, strict=True):
+    for flight, weight, again in zip(flights.found, flights.moving.weights, flights.moved_again, strict=True):
+        if again is not None and not uneven:
+            yield Finding("moved again", 0.0, 0.0, flight.toss.name, again)
         own = flights.moving.noise.of_weight(min(weight, 1.0))
         for part in (flight.backwards(), flight):
             missing = _interrupted(part, flights.moving.values, own, by_bad_frames=False)

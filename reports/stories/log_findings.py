@@ -53,10 +53,10 @@ def corrections(recording: str, findings: Iterable[Finding]) -> list[str]:
         sentences.append(
             f"Correct the header first: dropspin log check {recording} writes corrected.toml, with each remedy that is the only one."
         )
-    cut = [finding for finding in findings if finding.kind in ("frame dropped", "bad frame", "mid-air")]
+    cut = [finding for finding in findings if finding.kind in ("moved again", "frame dropped", "bad frame", "mid-air")]
     if cut:
         tosses = len({finding.toss for finding in cut})
-        sentences.append(f"Tosses of which a part is used, because frames are missing or wrong: {tosses}. {sentence(cut[0])}")
+        sentences.append(f"Tosses of which a part is used, as frames are of another throw, missing or wrong: {tosses}. {sentence(cut[0])}")
     return sentences
 
 

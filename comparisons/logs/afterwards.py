@@ -1,0 +1,78 @@
+"""What follows a flight: a body that is moved or thrown again, which gains energy."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, departures
+from dropspin.comparisons.logs.rotors import Rotation
+from dropspin.scenarios.bodies.shape import Shape
+from dropspin.scenarios.rotations import length, rotate, unrotate
+from dropspin.scenarios.state import Array
+
+SPAN, SMOOTHED = 0.2, 5
+"""Length of the pieces of which energies are measured [s], and frames of the running median that leaves out wrong positions before."""
+STILL, ERRORS = 0.02, 6.0
+"""How far a body that rests moves in a piece, over its size, or turns [rad], at most, beside so many deviations of the noise."""
+MUCH, HIGHER = 0.2, 0.1
+"""Gain of energy that errors explain: a share of what the body had above its lowest position, and a height over its size."""
+
+
+class Afterwards(NamedTuple):
+    """The frames from the end of a flight on. Energies are per mass [m²/s²].
+
+    Attributes:
+        rotor: The rotor of the flight.
+        known: Acceleration and d, shape (6,).
+        white: White noise of position [m] and orientation [rad].
+        body: The body.
+    """
+
+    rotor: Rotation
+    known: Array
+    white: tuple[float, float]
+    body: Shape
+
+
+def _energy(after: Afterwards) -> tuple[Array, Array, float]:
+    """Positions of the centre of mass in all frames [m], their potential energies, and the energy of the flight with that of its spin."""
+    rotor, toss, fall = after.rotor, after.rotor.flight.toss, after.known[ACCELERATION]
+    centre = toss.position - rotate(toss.orientation, after.known[OFFSET])
+    samples = departures(rotor.flight, after.known)
+    start, velocity = np.polynomial.polynomial.polyfit(samples.t, samples.values, 1)
+    (orientation,), (spin,) = rotor(np.array([rotor.flight.duration]))
+    turning = unrotate(orientation, spin)
+    spinning = float(turning @ after.body.inertia_tensor @ turning) / after.body.mass
+    return centre, -(centre @ fall), float(0.5 * (velocity @ velocity + spinning) - start @ fall)
+
+
+def moved_again(after: Afterwards) -> int | None:
+    """The frame from which on the body has more energy than a passive one that had that of its flight, or rested; None without one.
+
+    The energy of a piece is at least that of its lowest position and of its mean velocity, whatever it strikes within. At rest, a body has
+    nothing but potential energy.
+    """
+    flight, toss, size = after.rotor.flight, after.rotor.flight.toss, after.body.size
+    count, (white, turned) = max(SMOOTHED, round(SPAN / toss.time_step)), after.white
+    if len(toss) <= flight.end + count:
+        return None
+    centre, _, had = _energy(after)
+    reach = SMOOTHED // 2
+    path = np.median(sliding_window_view(np.pad(centre, ((reach, reach), (0, 0)), mode="edge"), SMOOTHED, axis=0), axis=2)
+    heights = -(path @ after.known[ACCELERATION])
+    pieces, turns, potential = (sliding_window_view(of[flight.end - 1 :], count + 1, axis=0) for of in (path, toss.orientation, heights))
+    spans = toss.t[flight.end - 1 + count :] - toss.t[flight.end - 1 : -count]
+    energy = potential.min(axis=1) + 0.5 * (length(pieces[..., -1] - pieces[..., 0]) / spans) ** 2
+    error = float(length(after.known[ACCELERATION])) * (HIGHER * size + ERRORS * white) + 0.5 * (ERRORS * white / SPAN) ** 2
+    still = np.ptp(pieces, axis=2).max(axis=1) < STILL * size + ERRORS * white
+    still &= np.ptp(turns, axis=2).max(axis=1) < STILL + ERRORS * turned
+    most = had + MUCH * (had - float(heights.min()))
+    gains = energy > np.minimum.accumulate(np.where(still, np.minimum(potential.max(axis=1), most), most)) + error
+    # Wrong positions that the median does not leave out are seldom in all pieces that begin in half of a span.
+    lasting = sliding_window_view(gains, min(count // 2, len(gains))).all(axis=1)
+    if not lasting.any():
+        return None
+    first = int(np.argmax(lasting))
+    rested = np.flatnonzero(still[:first])
+    return flight.end + first if not len(rested) else flight.end + int(rested[-1]) + count

@@ -1,4 +1,4 @@
-"""What follows a flight: a body that is moved or thrown again, which gains energy."""
+"""What follows a flight: a body that is moved or thrown again, which gains energy, or a step that is longer than any impact allows."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, departures
 from dropspin.comparisons.logs.rotors import Rotation
 from dropspin.scenarios.bodies.shape import Shape
-from dropspin.scenarios.rotations import length, rotate, unrotate
+from dropspin.scenarios.rotations import angle_between_orientations, length, rotate, unrotate
 from dropspin.scenarios.state import Array
 
 SPAN, SMOOTHED = 0.2, 5
@@ -17,6 +17,8 @@ STILL, ERRORS = 0.02, 6.0
 """How far a body that rests moves in a piece, over its size, or turns [rad], at most, beside so many deviations of the noise."""
 MUCH, HIGHER = 0.2, 0.1
 """Gain of energy that errors explain: a share of what the body had above its lowest position, and a height over its size."""
+LEAP = 1.5
+"""Speed of a step, over the largest one after any impact, from which on frames are missing in it."""
 
 
 class Afterwards(NamedTuple):
@@ -45,6 +47,20 @@ def _energy(after: Afterwards) -> tuple[Array, Array, float]:
     turning = unrotate(orientation, spin)
     spinning = float(turning @ after.body.inertia_tensor @ turning) / after.body.mass
     return centre, -(centre @ fall), float(0.5 * (velocity @ velocity + spinning) - start @ fall)
+
+
+def leap(after: Afterwards) -> int | None:
+    """The frame, of the first three after the flight, to which the step is longer than any impact allows: frames are missing before it."""
+    flight, toss = after.rotor.flight, after.rotor.flight.toss
+    centre, potential, had = _energy(after)
+    frames = slice(flight.end - 1, flight.end + 3)
+    t, centre, potential, orientation = toss.t[frames], centre[frames], potential[frames], toss.orientation[frames]
+    way = np.maximum(length(np.diff(centre, axis=0)) - ERRORS * after.white[0], 0.0)
+    turn = np.maximum(angle_between_orientations(orientation[:-1], orientation[1:]) - ERRORS * after.white[1], 0.0)
+    least = float(np.linalg.eigvalsh(after.body.inertia_tensor)[0]) / after.body.mass
+    allowed = 2.0 * np.maximum(had - np.minimum(potential[1:], potential[:-1]), 0.0)
+    long = (way**2 + least * turn**2) / np.diff(t) ** 2 > LEAP**2 * allowed
+    return flight.end + int(np.argmax(long)) if long.any() else None
 
 
 def moved_again(after: Afterwards) -> int | None:

@@ -125,11 +125,11 @@ def log_check(recording: Flights | Log | str | Path, on_progress: Callable[[str,
     if check.reads_the_columns_right:
         check = replace(check, findings=(*found, *of_lengths(flights.log)))
     if not check.reads_the_columns_right:  # heights are not known either
-        return replace(check, findings=tuple(one for one in check.findings if one.kind not in ("mid-air", "moved again")))
+        return replace(check, findings=tuple(one for one in check.findings if one.kind not in ("mid-air", "moved again", "leap")))
     known = {value.name: value.is_identifiable for value in values}
     off = list(_of_offset(flights, known))
     if off:  # the tracked point of a body that turns fast about another point seems not to fly
-        found = [finding for finding in found if finding.kind not in ("no flight", "late", "mid-air")]
+        found = [finding for finding in found if finding.kind not in ("no flight", "late", "mid-air", "leap")]
     found += [Finding("misread", toss=one.toss.name, frame=frame) for one in flights.found for frame in one.misread if frame < one.end - 3]
     found += [*of_scale(flights, drag), *off, *_of_inertia(flights, drag, known), *_of_departures(flights, drag), *of_floor(flights, ALARM)]
     return replace(check, findings=tuple(found))

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from dropspin.comparisons.logs.afterwards import leap
 from dropspin.comparisons.logs.flight import ACCELERATION, OFFSET, SURPRISING, Flight, departures, noise_of, surprise, window_size
 from dropspin.comparisons.logs.flights import NEAR_FLOOR, Flights, heights, heights_in
 from dropspin.comparisons.logs.header import UPRIGHT, Header
@@ -165,8 +166,12 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
     for toss in flights.log.tosses:
         if toss.name not in flown | held.keys():
             yield Finding("no flight", 0.0, window_size(toss, noise, flights.moving.values[ACCELERATION]), toss.name)
+    after = flights.afterwards if flights.log.header.floor is not None and not uneven else []  # of other flights nothing more is used
+    leaps = {
+        one.rotor.flight.toss.name: frame for one in after if (frame := leap(one)) is not None and one.rotor.flight.toss.name not in held
+    }
     for flight, weight, again in zip(flights.found, flights.moving.weights, flights.moved_again, strict=True):
-        if again is not None and not uneven:
+        if after and again is not None:
             yield Finding("moved again", 0.0, 0.0, flight.toss.name, again)
         own = flights.moving.noise.of_weight(min(weight, 1.0))
         for part in (flight.backwards(), flight):
@@ -179,6 +184,8 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
             elif part is flight and flight.toss.name in mid_air:
                 causes = (Cause("frames missing"), Cause("touched"))
                 yield Finding("mid-air", mid_air[flight.toss.name], 0.0, flight.toss.name, flight.end - 1, causes)
+            elif part is flight and flight.toss.name in leaps:
+                yield Finding("leap", 0.0, 0.0, flight.toss.name, leaps[flight.toss.name])
             elif part is not flight and flight.first > 2 and flight.toss.name not in held:
                 yield Finding("late", flight.first, 0.0, flight.toss.name, flight.first, (Cause("held"), Cause("earlier impact")))
 

@@ -53,7 +53,7 @@ def corrections(recording: str, findings: Iterable[Finding]) -> list[str]:
         sentences.append(
             f"Correct the header first: dropspin log check {recording} writes corrected.toml, with each remedy that is the only one."
         )
-    cut = [finding for finding in findings if finding.kind in ("moved again", "frame dropped", "bad frame", "mid-air")]
+    cut = [finding for finding in findings if finding.kind in ("moved again", "frame dropped", "bad frame", "leap", "mid-air")]
     if cut:
         tosses = len({finding.toss for finding in cut})
         sentences.append(f"Tosses of which a part is used, as frames are of another throw, missing or wrong: {tosses}. {sentence(cut[0])}")

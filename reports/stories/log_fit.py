@@ -58,11 +58,15 @@ class FittedLog(Study):
             for row in fit.estimates
             if not row.has_lower and not row.has_upper
         ]
+        unlike = [
+            f"The discrepancy with {engine} is large for the size of the body: its values may mean nothing, as where frames are missing."
+            for engine in fit.unlike
+        ]
         charts = [
             interval_rows(parameter, [row.engine for row in alike], [(row.value, row.lower, row.upper) for row in alike])
             for parameter, alike in grouped(fit.estimates, lambda estimate: estimate.parameter).items()
         ]
-        sentences = [legend, *unknown, *map(transfer, fit.transfers), *left_out(fit.left_out)]
+        sentences = [legend, *unlike, *unknown, *map(transfer, fit.transfers), *left_out(fit.left_out)]
         return Document(
             f"Friction and restitution of {self.recording}",
             [Table(rows), *([Charts("coefficients", charts)] if charts else []), Sentences(sentences)],

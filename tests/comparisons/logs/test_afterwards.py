@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.log_fits import WANG
 
 from dropspin.comparisons.logs.check import log_check
+from dropspin.comparisons.logs.fit import log_fit
 from dropspin.comparisons.logs.flights import Flights, flights_of
 from dropspin.comparisons.logs.header import Header
 from dropspin.comparisons.logs.log import Log, Toss
-from dropspin.reports.stories.log_findings import sentence
+from dropspin.reports.stories.log_findings import corrections, sentence
 from dropspin.scenarios.state import Array
 
 RADIUS, RATE, FALL = 0.05, 148.0, np.array([0.0, -9.81, 0.0])
@@ -84,3 +86,27 @@ def test_body_that_is_lifted_is_moved_again() -> None:
 
     moved = found(replace(log, tosses=tuple(map(lifted, log.tosses)))).moved_again
     assert all(frame is not None and 0 <= frame - len(log.tosses[0]) < 5 for frame in moved), moved
+
+
+def cut_around_impacts() -> Log:
+    """Of each toss 15 frames around the first impact are missing, without times that show it."""
+    log, shorter = bouncing(1, 0.5, 3), []
+    for toss in log.tosses:
+        impact = int(np.argmin(toss.position[:90, 1]))
+        kept = np.delete(np.arange(len(toss)), np.arange(impact - 3, impact + 12))
+        shorter.append(Toss(toss.name, toss.t[: len(kept)], toss.position[kept], toss.orientation[kept]))
+    return replace(log, tosses=tuple(shorter))
+
+
+def test_frames_that_are_missing_around_an_impact_are_named() -> None:
+    log = cut_around_impacts()
+    check = log_check(log)
+    assert {(one.kind, one.toss) for one in check.findings} == {("leap", toss.name) for toss in log.tosses}
+    assert "frames are missing before frame" in sentence(check.findings[0])
+    assert corrections("toss.toml", check.findings)[0].startswith("Tosses of which a part is used, as frames are of another throw, missing")
+
+
+@pytest.mark.extended
+def test_fit_of_tosses_of_which_frames_are_missing_is_doubted() -> None:
+    whole, cut = (log_fit(log, WANG, jobs=1) for log in (bouncing(1, 0.5, 3), cut_around_impacts()))
+    assert (whole.unlike, cut.unlike) == ((), (WANG,))

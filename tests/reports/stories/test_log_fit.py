@@ -51,3 +51,9 @@ def test_restitution_that_differs_is_a_setting_and_unidentified_friction_is_expl
     assert correct.items[0].endswith("Remedy: length_scale = 0.978.")
     remedies = "writes corrected.toml, with each remedy that is the only one."
     assert correct.items[1:] == [f"Correct the header first: dropspin log check r.toml {remedies}"]
+
+
+def test_discrepancy_that_is_large_for_the_body_is_said():
+    fit = LogFit(20, 8, (estimate("friction", False, True),), (), None, {"mujoco": 0.0447}, {}, True, ("mujoco",))
+    *_, sentences = FittedLog(recording="r.toml", findings=[], fit=fit).document().parts
+    assert "The discrepancy with mujoco is large for the size of the body: its values may mean nothing" in " ".join(sentences.items)

@@ -34,7 +34,7 @@ class Start:
     """The state of the centre of mass at the end of a flight.
 
     Attributes:
-        toss: The toss.
+        toss: The toss, up to where the body is moved again.
         first: The first frame of its flight.
         frame: The last one, at which the state is.
         state: Shape (13,).

@@ -12,7 +12,7 @@ from dropspin.comparisons.conformance.probes import Probe, differences
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.scenarios import Scenario, Trajectory
-from dropspin.scenarios.rotations import rotate, unrotate
+from dropspin.scenarios.rotations import length, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, RATES, SPIN, VELOCITY, Array
 from dropspin.scenarios.text import rounded
 from dropspin.scenarios.truths import exact_solution
@@ -21,6 +21,8 @@ QUANTITIES = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("ang
 """Those of `differences`."""
 CLEAR = 1e-3
 """Share of a speed, and ratio of a friction impulse, from which a difference is stated."""
+SLEEPY = 0.1
+"""Share of the largest speed of a fall below which an engine may put a body to sleep."""
 ALONG = 0.1
 """Change of the direction of an angular momentum, over the fall of its size, from which damping is not the only explanation; and that of an
 acceleration from which its size is not all that is wrong.
@@ -109,7 +111,8 @@ def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
         return
     before, after = first
     height, left = float(case.motion.position[before, 1]), float(case.states.lowest_height[after])
-    if left > allowed_position and not case.motion.velocity[after].any():
+    is_slow = length(case.motion.velocity[before]) < SLEEPY * length(case.exact.velocity).max()
+    if left > allowed_position and is_slow and not case.motion.velocity[after].any():
         yield f"the body stops {left:.2g} m above the floor: the engine puts it to sleep, or holds it"
         return
     if case.impacts:

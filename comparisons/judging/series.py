@@ -26,7 +26,7 @@ BY_CHANCE = 1e-3
 NOTICEABLE = 1e-3
 """Share of an error that its change from one time step to the next must exceed to tell its trend."""
 DIVERGING = 0.1
-"""Share of an error by which it must grow for each factor e of the time step, so that it may approach no value; it does as dt^-0.15."""
+"""Least power of 1/dt, from one time step to the next, with which an error grows so that it may approach no value."""
 TWO_DIGITS = 0.01
 """Logarithms of errors that differ by less than this are equal, because errors near rounding have few digits."""
 
@@ -123,11 +123,11 @@ def falls_ever_faster(h: Array, e: Array, small: Array) -> bool:
 
 
 def grows_ever_faster(h: Array, e: Array, small: Array) -> bool:
-    """Whether errors, coarsest first, grow toward finer steps by more for each factor of the step, and by `DIVERGING` of the finest.
+    """Whether errors, coarsest first, grow toward finer steps by more for each factor of the step, at the end at least as dt^-0.1.
 
     Three errors that change little often grow so by chance, though their limit is known well.
     """
-    least = DIVERGING * abs(e[-1]) * math.log(h[-2] / h[-1])
+    least = abs(e[-1]) * (1.0 - (h[-1] / h[-2]) ** DIVERGING)
     return bool((e[-1] - e[-2]) * np.sign(e[-1]) > least and falls_ever_faster(h, 2.0 * e[-1] - e, small))  # mirrored at the finest
 
 

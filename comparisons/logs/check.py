@@ -28,8 +28,6 @@ from dropspin.scenarios.state import Array
 
 LEAST_DECAY = 0.01
 """The least decay of the spin [1/s] that is a finding; engines have a larger damping."""
-AWAY, BEYOND = 0.025, 3.0
-"""How far positions may depart from a flight at its end: a share of the size of the body, and a multiple of the noise of a frame."""
 CENTRES = tuple(f"centre of mass, {axis}" for axis in "xyz")
 RATIOS = ("I_x / I_y over the header's", "I_z / I_y over the header's")
 """Names of values."""
@@ -131,7 +129,7 @@ def log_check(recording: Flights | Log | str | Path, on_progress: Callable[[str,
     if off:  # the tracked point of a body that turns fast about another point seems not to fly
         found = [finding for finding in found if finding.kind not in ("no flight", "late", "mid-air", "leap")]
     found += [Finding("misread", toss=one.toss.name, frame=frame) for one in flights.found for frame in one.misread if frame < one.end - 3]
-    found += [*of_scale(flights, drag), *off, *_of_inertia(flights, drag, known), *_of_departures(flights, drag), *of_floor(flights, ALARM)]
+    found += [*of_scale(flights, drag), *off, *_of_inertia(flights, drag, known), *of_floor(flights, ALARM)]
     return replace(check, findings=tuple(found))
 
 
@@ -183,14 +181,6 @@ def _of_inertia(flights: Flights, drag: Regression, known: Mapping[str, bool]) -
         yield Finding("drag" if drag.values[-1] > 0.0 else "no drag", float(drag.values[-1]), 0.0)
     if known["decay of the spin"] and found is flights.spinning:
         yield Finding("spin decay", float(found.values[-1]), 0.0)
-
-
-def _of_departures(flights: Flights, drag: Regression) -> Iterator[Finding]:
-    """Of positions that are not those of bodies with these orientations in free flight, whatever the acceleration and the drag."""
-    duration = float(np.median([flight.duration for flight in flights.found]))
-    away = math.sqrt(float(drag.noise.covariance(np.array([duration]))[0, 0]) - drag.noise.white**2)
-    if away > max(AWAY * flights.log.header.body.size, BEYOND * drag.noise.white):
-        yield Finding("departs", away, 0.0)
 
 
 def _turning(flights: Flights) -> Regression:

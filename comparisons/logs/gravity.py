@@ -24,8 +24,8 @@ UNIT = 0.05
 """Largest relative difference from the ratio of two units."""
 LEAST_SCALE = 5e-4
 """The least relative difference of gravity that is a finding."""
-LEAST_AT_REST = 0.004
-"""The least relative difference of heights at rest that tells causes apart."""
+NEARER = math.log(1.5)
+"""Logarithm of the ratio of heights at rest to expected ones up to which these explain them: the floor may be at another height."""
 
 
 def of_units(flights: Flights) -> Iterator[Finding]:
@@ -39,34 +39,28 @@ def of_units(flights: Flights) -> Iterator[Finding]:
     if up != header.up:
         yield Finding("up", causes=(Cause("upward axis", keys={"up": up}),))
     if abs(ratio - 1.0) > UNIT:
-        single = (_length_cause(header, ratio), _rate_cause(flights.log, ratio), _local(ratio * header.gravity))
-        at_rest, error = _lengths_at_rest(flights.log)
-        units = tuple(cause for cause in single if cause.name in ("length unit", "time unit"))
-        allowed = UNIT if units else 4.0 * error + LEAST_AT_REST
-        by_length, by_rate = (not abs(at_rest / expected - 1.0) > allowed for expected in (ratio, 1.0))
-        if by_length or by_rate:
-            causes = shown(*zip(single, (by_length, by_rate, by_rate), strict=True))
-            yield Finding("unit", ratio * header.gravity, header.gravity, causes=units or causes, rests=at_rest)
+        gravity, at_rest = ratio * header.gravity, _lengths_at_rest(flights.log)
+        both, (off, timed_off) = _length_cause(header, at_rest), (abs(math.log(at_rest / expected)) for expected in (ratio, 1.0))
+        causes: tuple[Cause, ...]
+        by_length, by_rate = off < min(NEARER, 0.5 * timed_off), timed_off < min(NEARER, 0.5 * off)
+        if both.name == "length unit" and not (by_length or by_rate):  # so are the times, or gravity
+            yield Finding("unit", gravity, header.gravity, causes=(both,), rests=at_rest)
+            causes = (_rate_cause(flights.log, ratio / at_rest), _local(gravity / at_rest))
         else:
-            yield from _of_both("unit", flights.log, ratio, at_rest)
+            single = (_length_cause(header, ratio), _rate_cause(flights.log, ratio), _local(gravity))
+            causes = shown(*zip(single, (by_length, by_rate, by_rate), strict=True))
+        units = tuple(cause for cause in causes if cause.name in ("length unit", "time unit"))
+        yield Finding("unit", gravity, header.gravity, causes=units or causes, rests=at_rest)
 
 
-def _lengths_at_rest(log: Log) -> tuple[float, float]:
-    """The recorded lengths over the true ones, and the relative error, by heights at rest in any unit; NaN if they show it unclearly."""
+def _lengths_at_rest(log: Log) -> float:
+    """The recorded lengths over the true ones, by the heights at rest, read in whatever unit; NaN if they do not show it clearly."""
     now = LENGTHS[log.header.length_unit]
     others = ((finding.causes[0].keys.get("length_unit"), read) for finding, read in in_other_readings(log))
     read_as = [(1.0, log), *((now / LENGTHS[unit], read) for unit, read in others if unit is not None)]
     scales = [(factor, *rests(read).scale()[:2]) for factor, read in read_as]
-    clear = [(abs(math.log(scale)), factor * scale, error / scale) for factor, scale, error in scales if 4.0 * error < UNIT * scale]
-    return min(clear, default=(0.0, math.nan, math.nan))[1:]
-
-
-def _of_both(kind: str, log: Log, ratio: float, lengths: float) -> Iterator[Finding]:
-    """Of lengths that are wrong beside times or gravity: of the ratio of gravity to the header's, heights at rest show their part."""
-    rate, gravity = _rate_cause(log, ratio / lengths), ratio * log.header.gravity
-    others = (rate,) if rate.name == "time unit" else (rate, _local(gravity / lengths))
-    for causes in ((_length_cause(log.header, lengths),), others):
-        yield Finding(kind, gravity, log.header.gravity, causes=causes, rests=lengths)
+    clear = [(abs(math.log(scale)), factor * scale) for factor, scale, error in scales if 4.0 * error < UNIT * scale]
+    return min(clear, default=(0.0, math.nan))[1]
 
 
 def _local(gravity: float) -> Cause:
@@ -105,13 +99,10 @@ def of_scale(flights: Flights, drag: Regression) -> Iterator[Finding]:
     ratio = -fall / header.gravity
     if not low <= header.gravity <= high and abs(ratio - 1.0) > LEAST_SCALE:
         at_rest, spread, _, _ = rests(flights.log).scale()
-        by_length, by_rate = (abs(at_rest - expected) < 4.0 * spread + LEAST_AT_REST for expected in (ratio, 1.0))
+        by_length, by_rate = (abs(at_rest - expected) < 4.0 * spread + 0.004 for expected in (ratio, 1.0))
         single = (_length_cause(header, ratio), _rate_cause(flights.log, ratio), _local(-fall))
         causes = shown(*zip(single, (by_length, by_rate, by_rate), strict=True))
-        if math.isfinite(at_rest) and not (by_length or by_rate):
-            yield from _of_both("scale", flights.log, ratio, at_rest)
-        else:
-            yield Finding("scale", -fall, header.gravity, causes=causes, rests=at_rest)
+        yield Finding("scale", -fall, header.gravity, causes=causes, rests=at_rest)
     if math.hypot(x, z) > math.hypot(wide[0], wide[2]):
         yield Finding("tilt", math.atan2(math.hypot(x, z), -fall), 0.0, causes=(Cause("axes"), Cause("push")))
 

@@ -261,7 +261,11 @@ def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:
     by_scale = (abs(found.values[1] / header.gravity + 1.0) + wide[1] / header.gravity) * float(np.mean(np.abs(resting.expected)))
     by_point = float(np.linalg.norm(np.abs(off) + wide[OFFSET]))
     if abs(above) > 4.0 * error + by_scale + by_point + RESTS_NEAR * header.body.size:
-        floor, (stretch, spread) = Cause("floor", keys={"floor_height": round(header.floor_height + above, 4)}), resting.stretch()
-        is_size = abs(stretch - 1.0) > 4.0 * spread + SAME_SIZE
+        floor, (stretch, spread) = (
+            Cause("floor", keys={"floor_height": round(header.floor_height + above, 4)}),
+            resting.stretch(header.body.size),
+        )
+        lengths = -found.values[1] / header.gravity
+        is_size = min(abs(stretch - 1.0), abs(stretch - lengths)) > 4.0 * spread + SAME_SIZE
         causes = (Cause("size of the body"),) if is_size else (floor, Cause("size of the body")) if math.isnan(stretch) else (floor,)
         yield Finding("floor", above, 0.0, causes=causes, rests=stretch)

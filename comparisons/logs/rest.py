@@ -25,7 +25,7 @@ FEWEST_FRAMES = 5
 FEWEST_RESTS = 6
 """Rests that the scale and three components of δ need."""
 OTHER_FACE = 0.05
-"""Difference of the expected heights, as a share of them, from which on bodies rest on several faces."""
+"""Difference of the expected heights, as a share of the size of the body, from which on it rests on several faces."""
 LEVEL = 0.04
 """Heights of vertices, as a share of the size of the body, that count as equal: a turn of 2 degrees."""
 
@@ -56,9 +56,12 @@ class Rests(NamedTuple):
         errors[seen] = np.sqrt(float(left @ left) / (len(left) - len(seen)) * np.diag(np.linalg.inv(columns.T @ columns)))
         return float(values[0]), float(errors[0]), values[1:], errors[1:]
 
-    def stretch(self) -> tuple[float, float]:
-        """Differences of heights between faces over the expected ones, wherever the floor is, and the standard error; NaN of one face."""
-        if len(self.heights) < FEWEST_RESTS or np.ptp(self.expected) < OTHER_FACE * float(self.expected.max()):
+    def stretch(self, size: float) -> tuple[float, float]:
+        """Differences of heights between faces over the expected ones, wherever the floor is, and the standard error; NaN of one face.
+
+        `size` is that of the body [m].
+        """
+        if len(self.heights) < FEWEST_RESTS or np.ptp(self.expected) < OTHER_FACE * size:
             return np.nan, np.nan
         (slope, _), covariance = np.polyfit(self.expected, self.heights, 1, cov=True)
         return float(slope), math.sqrt(covariance[0, 0])

@@ -108,7 +108,7 @@ def changes_of_metrics(
     phases, cases = phases[::stride], cases[::stride]
     size, signs = len(phases), _signs(own, precision, len(phases))
     before = {metric.name: metric.value_or_nan(cases) for metric in metrics} if signs else {}
-    in_batch = dict(before)
+    in_batch = dict.fromkeys(before, 0.0)
     at_once = max(1, MOST_ROWS // (size * own.scene.steps(dt)))
     if size > 1:  # they roll about their corners: perturbed by eps of single precision they would slip, which is another motion
         precision = np.float64
@@ -127,12 +127,13 @@ def changes_of_metrics(
         )
         if isinstance(motions, Breakdown):
             raise motions
+        compared = before
         if len(motions) > len(starts) and not np.array_equal((beside := motions.pop(0)).states, cases[0].motion.states):
             moved = compare([beside], phases)
-            in_batch.update({metric.name: metric.value_or_nan(moved) for metric in metrics})
+            compared = {metric.name: metric.value_or_nan(moved) for metric in metrics}
+            in_batch.update({name: max(in_batch[name], abs(value - before[name])) for name, value in compared.items()})
         for number in range(0, len(motions), size):
             moved = compare(motions[number : number + size], phases)
-            yield {metric.name: abs(metric.value_or_nan(moved) - in_batch[metric.name]) for metric in metrics}
+            yield {metric.name: abs(metric.value_or_nan(moved) - compared[metric.name]) for metric in metrics}
 
-    found = list(chain(*map(changes, range(0, len(signs), at_once))))
-    return Changes(found, {name: abs(value - before[name]) for name, value in in_batch.items()})
+    return Changes(list(chain(*map(changes, range(0, len(signs), at_once)))), in_batch)

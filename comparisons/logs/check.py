@@ -128,6 +128,7 @@ def log_check(recording: Flights | Log | str | Path, on_progress: Callable[[str,
     off = list(_of_offset(flights, known))
     if off:  # the tracked point of a body that turns fast about another point seems not to fly
         found = [finding for finding in found if finding.kind not in ("no flight", "late", "mid-air", "leap")]
+    # The last frames of a flight may be of the impact.
     found += [Finding("misread", toss=one.toss.name, frame=frame) for one in flights.found for frame in one.misread if frame < one.end - 3]
     found += [*of_scale(flights, drag), *off, *_of_inertia(flights, drag, known), *of_floor(flights, ALARM)]
     return replace(check, findings=tuple(found))

@@ -13,7 +13,7 @@ from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
 from dropspin.comparisons.logs.log import Cause, Finding, Log
 from dropspin.comparisons.logs.noise import Regression
-from dropspin.comparisons.logs.other_conventions import in_other_readings
+from dropspin.comparisons.logs.other_conventions import in_unit
 from dropspin.comparisons.logs.rest import rests
 from dropspin.scenarios.rotations import unrotate
 from dropspin.scenarios.state import UP
@@ -38,27 +38,25 @@ def of_units(flights: Flights) -> Iterator[Finding]:
     up = ("-" if recorded[axis] < 0.0 else "") + "xyz"[axis]
     if up != header.up:
         yield Finding("up", causes=(Cause("upward axis", keys={"up": up}),))
-    if abs(ratio - 1.0) > UNIT:
-        gravity, at_rest = ratio * header.gravity, _lengths_at_rest(flights.log)
-        both, (off, timed_off) = _length_cause(header, at_rest), (abs(math.log(at_rest / expected)) for expected in (ratio, 1.0))
-        causes: tuple[Cause, ...]
-        by_length, by_rate = off < min(NEARER, 0.5 * timed_off), timed_off < min(NEARER, 0.5 * off)
-        if both.name == "length unit" and not (by_length or by_rate):  # so are the times, or gravity
-            yield Finding("unit", gravity, header.gravity, causes=(both,), rests=at_rest)
-            causes = (_rate_cause(flights.log, ratio / at_rest), _local(gravity / at_rest))
-        else:
-            single = (_length_cause(header, ratio), _rate_cause(flights.log, ratio), _local(gravity))
-            causes = shown(*zip(single, (by_length, by_rate, by_rate), strict=True))
-        units = tuple(cause for cause in causes if cause.name in ("length unit", "time unit"))
-        yield Finding("unit", gravity, header.gravity, causes=units or causes, rests=at_rest)
+    if abs(ratio - 1.0) <= UNIT:
+        return
+    gravity, at_rest = ratio * header.gravity, _lengths_at_rest(flights.log)
+    off, off_in_time = (abs(math.log(at_rest / expected)) for expected in (ratio, 1.0))
+    by_length, by_rate = off < min(NEARER, 0.5 * off_in_time), off_in_time < min(NEARER, 0.5 * off)
+    lengths = _length_cause(header, at_rest)
+    if lengths.name == "length unit" and not (by_length or by_rate):  # beside a wrong rate, or another gravity
+        yield Finding("unit", gravity, header.gravity, causes=(lengths,), rests=at_rest)
+        ratio, by_rate = ratio / at_rest, True
+    single = (_length_cause(header, ratio), _rate_cause(flights.log, ratio), _local(ratio * header.gravity))
+    causes = shown(*zip(single, (by_length, by_rate, by_rate), strict=True))
+    units = tuple(cause for cause in causes if cause.name in ("length unit", "time unit"))
+    yield Finding("unit", gravity, header.gravity, causes=units or causes, rests=at_rest)
 
 
 def _lengths_at_rest(log: Log) -> float:
     """The recorded lengths over the true ones, by the heights at rest, read in whatever unit; NaN if they do not show it clearly."""
     now = LENGTHS[log.header.length_unit]
-    others = ((finding.causes[0].keys.get("length_unit"), read) for finding, read in in_other_readings(log))
-    read_as = [(1.0, log), *((now / LENGTHS[unit], read) for unit, read in others if unit is not None)]
-    scales = [(factor, *rests(read).scale()[:2]) for factor, read in read_as]
+    scales = [(now / value, *rests(in_unit(log, "length_unit", unit)).scale()[:2]) for unit, value in LENGTHS.items()]
     clear = [(abs(math.log(scale)), factor * scale) for factor, scale, error in scales if 4.0 * error < UNIT * scale]
     return min(clear, default=(0.0, math.nan))[1]
 

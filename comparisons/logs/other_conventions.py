@@ -1,11 +1,11 @@
 """Other readings of a recording's columns: units, quaternions, and the order of the axes in which the header gives the body."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import permutations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -64,7 +64,7 @@ def of_quaternions(log: Log, flights: Flights) -> Iterator[Finding]:
     tried = [] if is_ball else flights.found[:MOST_ROTORS]
     readings = []
     for cause, rolled, inverse in _readings(log.header):
-        read = _corrected(log, cause, partial(_read_as, header=log.header, rolled=rolled, inverse=inverse))
+        read = _corrected(log, cause.keys, partial(_read_as, header=log.header, rolled=rolled, inverse=inverse))
         some = [replace(flight, toss=_read_as(flight.toss, log.header, rolled, inverse)) for flight in tried]
         readings.append(_Explanation(cause, *(_left_by(some, inertia) if some else (turning, 0.0)), level_share(read)[0]))
     can_be_explained = bool(tried) and EXPLAINED * turning > LEAST_LEFT * flights.turning.noise.white
@@ -126,21 +126,27 @@ def in_other_readings(log: Log) -> Iterator[tuple[Finding, Log]]:
     """
     header = log.header
     for key, units, power in (("length_unit", LENGTHS, 1), ("time_unit", TIMES, -2)):
-        now = getattr(header, key)
         for unit in units if header.rate is None or key == "length_unit" else ():
-            cause, factor = Cause(key.replace("_", " "), keys={key: unit}), units[unit] / units[now]
-            lengths, times = (factor, 1.0) if power == 1 else (1.0, factor)
-            if unit != now:
-                read = _corrected(log, cause, partial(_in_units, header=header, lengths=lengths, times=times))
-                yield Finding("unit", header.gravity / factor**power, header.gravity, causes=(cause,)), read
+            factor = units[unit] / units[getattr(header, key)]
+            if unit != getattr(header, key):
+                cause = Cause(key.replace("_", " "), keys={key: unit})
+                yield Finding("unit", header.gravity / factor**power, header.gravity, causes=(cause,)), in_unit(log, key, unit)
     for cause, rolled, inverse in _readings(header):
-        read = _corrected(log, cause, partial(_read_as, header=header, rolled=rolled, inverse=inverse))
+        read = _corrected(log, cause.keys, partial(_read_as, header=header, rolled=rolled, inverse=inverse))
         yield Finding("quaternion", level_share(log)[0], level_share(read)[0], causes=(cause,)), read
 
 
-def _corrected(log: Log, cause: Cause, change: Callable[[Toss], Toss]) -> Log:
-    """The recording with the keys of a cause in its header, and with each toss changed alike."""
-    return replace(log, header=log.header.model_copy(update=dict(cause.keys)), tosses=tuple(map(change, log.tosses)))
+def in_unit(log: Log, key: str, unit: str) -> Log:
+    """The recording with its lengths (`length_unit`) or times (`time_unit`) in another unit."""
+    header, units = log.header, LENGTHS if key == "length_unit" else TIMES
+    factor = units[unit] / units[getattr(header, key)]
+    lengths, times = (factor, 1.0) if units is LENGTHS else (1.0, factor)
+    return _corrected(log, {key: unit}, partial(_in_units, header=header, lengths=lengths, times=times))
+
+
+def _corrected(log: Log, keys: Mapping[str, Any], change: Callable[[Toss], Toss]) -> Log:
+    """The recording with other keys in its header, and with each toss changed alike."""
+    return replace(log, header=log.header.model_copy(update=dict(keys)), tosses=tuple(map(change, log.tosses)))
 
 
 def _in_units(toss: Toss, header: Header, lengths: float, times: float) -> Toss:

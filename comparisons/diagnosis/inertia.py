@@ -1,11 +1,12 @@
 """The inertia of a body: whether its shape can have it, and that of a solid of uniform density."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from dropspin.comparisons.diagnosis.answers import Answer, Finding, Remedy, digits, vector_text
+from dropspin.comparisons.diagnosis.answers import NOTEWORTHY, Answer, Finding, Remedy, digits, vector_text
 from dropspin.comparisons.diagnosis.loose_body import ROUNDING, LooseBody, MassProperties
 from dropspin.scenarios.bodies.inertia import mean_squares
 from dropspin.scenarios.bodies.possible_moments import largest_multiple
@@ -28,6 +29,15 @@ def inertia(body: LooseBody) -> list[Answer]:
         moment = float(body.principal[0][number])
         answers.append(Answer("inertia", MOMENT, "kg m²", vector_text(axis), measured=moment, physical=of_solid))
     return answers
+
+
+def armature(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
+    """What a joint's armature makes of the least moment, with which a torque turns the body, at any time step [s]."""
+    if not body.in_file("armature"):
+        return []
+    factor = 1.0 + body.armature / float(body.principal[0].min())
+    answer = Answer("inertia", "least moment with armature / without", "1", measured=factor, in_force=factor, physical=1.0)
+    return [replace(answer, findings=(Finding("setting", ("armature",)),) * (factor > 1.0 + NOTEWORTHY))]
 
 
 def _impossible(body: LooseBody, given: MassProperties, solid: MassProperties | None) -> Iterator[Answer]:

@@ -106,6 +106,8 @@ class MuJoCoAlone:
             spec.option.gravity = gravity
             spec.option.wind = rotate(self.level, np.array(spec.option.wind))
             spec.compiler.degree = False
+            for name in overrides(self.file.model) if self.pairs else ():  # which count instead of the pairs' settings
+                setattr(spec.option, f"o_{name}", self.in_force_of(next(iter(self.pairs)))[name])
             self._add_bodies(spec)
             if floor:
                 self._add_surface(spec)
@@ -196,7 +198,7 @@ class MuJoCoAlone:
         changed = {name: np.array(str(self._changes[name]).split(), float) for name in ("solref", "solimp") if name in self._changes}
         dimensions = {"condim": self._changes["condim"]} if "condim" in self._changes else {}
         still = {"margin": 0.0, "gap": 0.0} if "margin" in self._changes else {}
-        return pair | {"solref": self.clamped(pair)} | ({} if overrides(self.file.model) else changed | still) | dimensions
+        return pair | {"solref": self.clamped(pair)} | changed | still | dimensions
 
     def clamped(self, pair: Mapping[str, Any]) -> Array:
         """The time constant and the damping ratio that are in force at the time step of the file, or of a remedy."""

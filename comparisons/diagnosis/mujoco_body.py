@@ -15,7 +15,7 @@ from dropspin.comparisons.diagnosis.loose_body import LIGHT, Changes, Drag, Loos
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_changes import ignored
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
-from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of
+from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of, overrides
 from dropspin.comparisons.diagnosis.mujoco_file import ADDED, PLANE, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_options import ELLIPTIC, ENUMERATIONS, OF_ALL
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
@@ -131,10 +131,14 @@ class MuJoCoBody(LooseBody):
         return MuJoCoBody(self.name, self._alone.changed(changes))
 
     def patch(self, changes: Changes, dt: float) -> str:
-        texts = {name: spelled(value) for name, value in changes.items()}
+        texts = {self._named(name): spelled(value) for name, value in changes.items()}
         options = {name: text for name, text in texts.items() if name in OF_ALL}
         options |= {"timestep": f"{dt:g}"} if dt != self.dt else {}
         return self._text.patch(options, {name: text for name, text in texts.items() if name not in options})
+
+    def _named(self, name: str) -> str:
+        """The name of what has to be changed for a setting: an option, if it overrides the settings of all contacts."""
+        return f"o_{name}" if name in overrides(self._file.model) else name
 
     def for_restitution(self, restitution: float, dt: float) -> Changes:
         is_rk4 = self._model.opt.integrator == ENUMERATIONS["RK4"]  # all stages of which a damper for one step acts in
@@ -152,7 +156,7 @@ class MuJoCoBody(LooseBody):
         return stored.tobytes(), self.pose.tobytes(), self.surface, *self.unmodelled, *words
 
     def elsewhere(self, dt: float, changes: Changes) -> tuple[int, bool]:
-        is_global = dt != self.dt or not OF_ALL.isdisjoint(changes)
+        is_global = dt != self.dt or not OF_ALL.isdisjoint(map(self._named, changes))
         others = [body for body in self._file.heads.values() if body != self._alone.head] if is_global else []
         return len(others), not is_global or self._file.runs(dt, changes)
 

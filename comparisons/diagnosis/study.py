@@ -12,7 +12,7 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, Answer, Finding
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble, worst_tumble
-from dropspin.comparisons.diagnosis.inertia import inertia
+from dropspin.comparisons.diagnosis.inertia import armature, inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.remedies import Question, Targets, answers_to
 from dropspin.comparisons.diagnosis.sliding import creep, roll, slide
@@ -41,7 +41,7 @@ LONG = 10.0
 """Length of a body from which a model may be in mm, read as m [m]."""
 IN_FORCE = ("name", "engine", "version", "dt", "mass", "surface", "friction", "friction_across")
 """What a diagnosis has as an engine has it in force."""
-QUESTIONS: tuple[Question, ...] = (fall, spin, tumble, worst_tumble, impact, rest, slide, creep, roll)
+QUESTIONS: tuple[Question, ...] = (armature, fall, spin, tumble, worst_tumble, impact, rest, slide, creep, roll)
 
 
 class BodyDiagnosis(NamedTuple):

@@ -8,7 +8,7 @@ from support.model_files import FREE, PLANE, body_of, by_quantity, findings_of, 
 
 from dropspin.comparisons.diagnosis.answers import REBOUND
 from dropspin.comparisons.diagnosis.flight import fall, spin, tumble, worst_tumble
-from dropspin.comparisons.diagnosis.inertia import inertia
+from dropspin.comparisons.diagnosis.inertia import armature, inertia
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
 from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
@@ -53,6 +53,18 @@ def test_armature_slows_the_fall_and_is_found_in_a_default_class(tmp_path):
     assert (answer.findings[0].kind, answer.findings[0].settings) == ("setting", ("armature",))
     assert answer.in_force == pytest.approx(0.5 * 9.81 / 1.5, rel=1e-9)
     assert str(body.settings["armature"]) == 'armature="0.5" (model.xml, line 3)'
+
+
+@pytest.mark.parametrize(("added", "kinds"), [(0.02, ["setting"]), (1e-5, [])])
+def test_armature_is_compared_with_the_moment_of_a_ball(tmp_path, added, kinds):
+    """The ball of 2.2 kg has a moment of 0.0022 kg m², and 0.9 % more mass with 0.02 kg: MuJoCo turns it a tenth as fast."""
+    ball = '<body name="b" pos="0 0 1"><joint type="free"/><geom size=".05" mass="2.2"/></body>'
+    body = body_of(tmp_path, ball, head=f'<default>\n<joint armature="{added}"/></default>')
+    answers = list(answers_to(armature, body))
+    assert [answer.measured for answer in answers] == [pytest.approx(1.0 + added / 0.0022, rel=1e-12)]
+    found = answers[0].findings
+    assert [(one.kind, one.settings) for one in found] == [(kind, ("armature",)) for kind in kinds]
+    assert [remedy.value for one in found for remedy in one.remedies] == [1.0] * len(kinds)
 
 
 @pytest.mark.extended

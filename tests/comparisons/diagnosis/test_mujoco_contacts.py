@@ -255,10 +255,18 @@ def test_one_change_is_given_for_a_restitution_at_all_speeds(tmp_path, wanted, s
 
 
 def test_settings_that_miss_the_wanted_restitution_are_no_remedy(tmp_path):
-    """The flag overrides what the geometry says."""
-    body = body_of(tmp_path, BALL.format(""), head='<option o_solref="0.2 1"><flag override="enable"/></option>')
+    """With a damping of 500 N s/m the ball is at rest after a few milliseconds, whatever its contact."""
+    body = body_of(tmp_path, '<body name="b" pos="0 0 1"><joint type="free" damping="500"/><geom size=".1" mass="1"/></body>')
     [answer] = Targets(0.5).judged(body, [rebound(body, [body.dt], 1.0, REBOUND)])
     assert [(finding.kind, finding.remedies) for finding in answer.findings] == [("target", ())]
+
+
+def test_settings_for_a_restitution_are_those_that_override_what_the_geometry_says(tmp_path):
+    body = body_of(tmp_path, BALL.format(""), head='<option o_solref="0.2 1"><flag override="enable"/></option>')
+    [answer] = Targets(0.5).judged(body, [rebound(body, [body.dt], 1.0, REBOUND)])
+    [remedy] = answer.findings[0].remedies
+    assert remedy.text.startswith("<option o_solref=")
+    assert remedy.value == pytest.approx(0.5, abs=0.01)
 
 
 def test_tall_box_that_friction_turns_over_its_edge_has_no_stopping_distance(tmp_path):

@@ -255,8 +255,8 @@ class LooseBody(ABC):
         """What to write for changes and a time step [s], in the words of the file, and where."""
 
     @abstractmethod
-    def for_restitution(self, restitution: float, dt: float) -> Changes:
-        """The changes that give a coefficient of restitution at a time step [s], those of `dropspin calibrate`."""
+    def for_contact(self, restitution: float | None, friction: float | None, dt: float) -> Changes:
+        """The changes that give coefficients of restitution and of friction at a time step [s], those of `dropspin calibrate`."""
 
     @property
     def likeness(self) -> tuple[object, ...]:

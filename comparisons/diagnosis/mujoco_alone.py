@@ -28,6 +28,8 @@ from dropspin.scenarios.truths.soft_rest import GeomSettings, SoftContact
 FLAGS = mujoco.mjtDisableBit
 NO_DAMPER = int(getattr(FLAGS, "mjDSBL_DAMPER", getattr(FLAGS, "mjDSBL_PASSIVE", 0)))
 """The flag that disables dampers, in older versions with all passive forces."""
+OF_CONTACT = ("solref", "solimp", "solreffriction", "friction")
+"""Settings of a contact that may be changed, as texts."""
 WIDE = 100.0
 """Half the width of a box that a body lands on [m]."""
 OFF_CENTRE = np.array([0.37, 0.0, 0.23])
@@ -195,7 +197,7 @@ class MuJoCoAlone:
         Of the file, whatever step is simulated: as dt → 0 the contact stays the same. Of another step if that is tried as a remedy.
         """
         pair = self.pairs[geom]
-        changed = {name: np.array(str(self._changes[name]).split(), float) for name in ("solref", "solimp") if name in self._changes}
+        changed = {name: np.array(str(self._changes[name]).split(), float) for name in OF_CONTACT if name in self._changes}
         dimensions = {"condim": self._changes["condim"]} if "condim" in self._changes else {}
         still = {"margin": 0.0, "gap": 0.0} if "margin" in self._changes else {}
         return pair | {"solref": self.clamped(pair)} | changed | still | dimensions

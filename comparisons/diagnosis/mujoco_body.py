@@ -140,11 +140,20 @@ class MuJoCoBody(LooseBody):
         """The name of what has to be changed for a setting: an option, if it overrides the settings of all contacts."""
         return f"o_{name}" if name in overrides(self._file.model) else name
 
-    def for_restitution(self, restitution: float, dt: float) -> Changes:
+    def for_contact(self, restitution: float | None, friction: float | None, dt: float) -> Changes:
+        changes = {} if restitution is None else self._for_restitution(restitution, dt)
+        if friction is None:
+            return changes
+        touching = next(iter(self._touching.values()))
+        numbers = " ".join(f"{value:g}" for value in (friction, friction, *touching["friction"][2:]))
+        return {**changes, "friction": numbers} | ({"condim": 3} if touching["condim"] == 1 else {})
+
+    def _for_restitution(self, restitution: float, dt: float) -> Changes:
         is_rk4 = self._model.opt.integrator == ENUMERATIONS["RK4"]  # all stages of which a damper for one step acts in
         floor = Floor(restitution=max(restitution, LEAST_OF_A_SPRING) if is_rk4 else restitution, friction=0.0)
         settings = contact(floor, dt, spring_steps=SPRING_STEPS if is_rk4 else 0.0)
-        return {name: " ".join(f"{value:.6g}" for value in settings[name]) for name in ("solref", "solimp")}
+        names = ("solref", "solimp", "solreffriction") if self._text.can_pair else ("solref", "solimp")
+        return {name: " ".join(f"{value:.6g}" for value in settings[name]) for name in names}
 
     @property
     def likeness(self) -> tuple[object, ...]:

@@ -1,6 +1,6 @@
 """A body of an MJCF or URDF file in the file's own words: its mass, its settings with their lines, and how to change them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import MassProperties
 from dropspin.comparisons.diagnosis.mjcf_defaults import mjcf_setting, option_setting
-from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
+from dropspin.comparisons.diagnosis.mujoco_alone import OF_CONTACT, MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
 from dropspin.comparisons.diagnosis.mujoco_contacts import effect_of, overrides
 from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, pair_element
@@ -179,7 +179,7 @@ class BodyText:
             found += [joint.changed(of_joint) for joint in self._joint]
         if "gravcomp" in others:
             found += [body.changed({"gravcomp": others["gravcomp"]}) for body in self._bodies if "gravcomp" in body.attributes]
-        if contact := {name: value for name, value in others.items() if name in ("solref", "solimp", "margin", "condim")}:
+        if contact := {name: value for name, value in others.items() if name in (*OF_CONTACT, "margin", "condim")}:
             found += self._with_contact(contact)
         return ", ".join(dict.fromkeys(map(str, found))) or " ".join(f'{name}="{value}"' for name, value in others.items())
 
@@ -212,6 +212,10 @@ class BodyText:
         if "margin" in changes:
             wide = [geom for geom in (*alone, self._surface) if alone and geom is not None and self.model.geom_margin[geom]]
             return found + [self._geom_changed(geom, {"margin": 0}) for geom in wide]
+        if "solreffriction" in changes:
+            return [*found, *(one for number in alone for one in self._paired(number, changes))]
+        if "friction" in changes:
+            changes = {**changes, "friction": " ".join(np.array(str(changes["friction"]).split())[OF_GEOM])}
         for number in alone:
             contact = self._contacts[number]
             kept = {"friction": contact["friction"][OF_GEOM], "condim": np.array([contact["condim"]])}
@@ -222,15 +226,37 @@ class BodyText:
             found.append(self._geom_changed(number, {**changes, "priority": priority, **texts}))
         return found
 
+    @property
+    def can_pair(self) -> bool:
+        """Whether the file can have a contact pair of the body with what it lands on, and no option overrides its settings."""
+        has_both = self._surface is not None and geom_element(self.file, self._surface) is not None
+        return has_both and not self.file.is_urdf and not overrides(self.model)
+
+    def _paired(self, number: int, changes: Mapping[str, object]) -> Iterator[Setting | str]:
+        """A contact pair of a geometry and the surface with other settings, and names for those of them that have none."""
+        assert self._surface is not None  # `can_pair`
+        contact, geoms = self._contacts[number], [self._surface, number]
+        names = [mujoco.mj_id2name(self.model, GEOM, geom) or self._called(geom) for geom in geoms]
+        for geom, name in zip(geoms, names, strict=True):
+            if not mujoco.mj_id2name(self.model, GEOM, geom):
+                yield self._geom_changed(geom, {"name": name})
+        kept = {name: contact[name] for name in ("friction", "condim", "margin", "gap") if np.any(contact[name])}
+        texts = {name: " ".join(f"{one:g}" for one in np.atleast_1d(value)) for name, value in kept.items()}
+        pair = tagged("pair", {"geom1": names[0], "geom2": names[1], **texts, **changes})
+        yield printable(f"<contact>{pair}/></contact>")
+
     def _geom_changed(self, number: int, changes: Mapping[str, object]) -> Setting | str:
         """A geometry with other settings; one that has no element in the file by its name or number, and that of its body."""
         if (element := geom_element(self.file, number)) is not None:
             return element.changed(changes)
+        converted = " in an MJCF file (a URDF has no such settings)" if self.file.is_urdf else ""
+        return printable(f"{tagged('geom', changes)}/> for {self._called(number)}") + converted
+
+    def _called(self, number: int) -> str:
+        """A geometry by its name or its place in its body, and the body by its name or number."""
         body = int(self.model.geom_bodyid[number])
         name = mujoco.mj_id2name(self.model, GEOM, number) or f"geometry {number - self.model.body_geomadr[body] + 1}"
-        of_body = mujoco.mj_id2name(self.model, BODY, body) or f"body {body}"
-        converted = " in an MJCF file (a URDF has no such settings)" if self.file.is_urdf else ""
-        return printable(f"{tagged('geom', changes)}/> for {name} of {of_body}") + converted
+        return f"{name} of {mujoco.mj_id2name(self.model, BODY, body) or f'body {body}'}"
 
 
 def differ(wanted: Any, has: Any) -> bool:

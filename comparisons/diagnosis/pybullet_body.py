@@ -49,9 +49,10 @@ CALLS = {
     "restitution": "changeDynamics(plane, -1, restitution={:g})",
     "own restitution": "changeDynamics(body, -1, restitution={:g})",
     "rolling": "changeDynamics(body, -1, rollingFriction={:g})",
+    "friction": "changeDynamics(body, -1, lateralFriction={:g})",
 }
 """What to call for changes of settings."""
-OF_LINKS = {"own restitution": "restitution", "rolling": "rollingFriction"}
+OF_LINKS = {"own restitution": "restitution", "rolling": "rollingFriction", "friction": "lateralFriction"}
 """What PyBullet calls settings of each link."""
 OF_EVERY_LINK = "for link in range(-1, getNumJoints(body)): changeDynamics(body, link, {}={{:g}})"
 WRITTEN = (
@@ -128,8 +129,9 @@ class PyBulletBody(LooseBody):
         calls = [texts[name].format(value) for name, value in changes.items()]
         return ", ".join([*calls, *([f"setTimeStep({dt:g})"] if dt != STEP else [])])
 
-    def for_restitution(self, restitution: float, dt: float) -> Changes:
-        return {"own restitution": restitution, "restitution": 1.0, "contactERP": 0.0}
+    def for_contact(self, restitution: float | None, friction: float | None, dt: float) -> Changes:
+        changes = {} if restitution is None else {"own restitution": restitution, "restitution": 1.0, "contactERP": 0.0}
+        return changes if friction is None else {**changes, "friction": friction / self._friction_of_plane}
 
     def motions(self, starts: Array, dt: float, steps: int, gravity: Array, *, floor: bool) -> Array:
         body, _ = self._world(floor)
@@ -194,6 +196,7 @@ class PyBulletBody(LooseBody):
         bare = [link.mass for link in self._links if not link.geometry and next(link.element.every("visual"), None) is None]
         self.is_bounded = sum(bare) <= LIGHT * mass
         self.missed = f"{SURFACE}: its collision group and mask exclude static bodies" if parts and not is_held else ""
+        self._friction_of_plane = plane[1]
         self.friction = touching[0].dynamics[1] * plane[1] if len(frictions) == 1 else math.nan
         self.restitution = touching[0].restitution * plane[5] if is_hard and len(restitutions) == 1 else None
         self.margin = MARGIN if any(part.shape.shape == "mesh" for part in bottom) else 0.0

@@ -1,7 +1,7 @@
 """Remedies of findings: what removes them, tried on the body."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -45,9 +45,10 @@ class Targets(NamedTuple):
         """
         is_of_file = not (body.missed or body.left_out)
         missing = [answer for answer in answers if is_of_file and not self.meets(answer)]
-        remedies = self._for_restitution(body, answers) if any(answer.quantity == REBOUND for answer in missing) else {}
+        missed = {answer.quantity for answer in missing}
+        remedies = self._remedies(body, answers, missed) or self._remedies(body, answers, missed - {REBOUND})
         for answer in answers:
-            finding = Finding("target", (), remedies.get(answer.speed, ()), f"the target is {self.wanted.get(answer.quantity, math.nan):g}")
+            finding = Finding("target", (), remedies.get(answer, ()), f"the target is {self.wanted.get(answer.quantity, math.nan):g}")
             yield replace(answer, findings=(*answer.findings, finding)) if answer in missing else answer
         measured = {answer.quantity for answer in answers if is_of_file}
         for quantity in (name for name in self.wanted if name not in measured):
@@ -60,25 +61,31 @@ class Targets(NamedTuple):
         wanted = self.wanted.get(answer.quantity)
         return wanted is None or abs(answer.measured - wanted) <= NOTEWORTHY
 
-    def _for_restitution(self, body: LooseBody, answers: Sequence[Answer]) -> dict[float, tuple[Remedy]]:
-        """By the speed of an impact, settings for the restitution, at the largest time step at which they meet the target at all speeds.
+    def _remedies(self, body: LooseBody, answers: Sequence[Answer], missed: Collection[str]) -> dict[Answer, tuple[Remedy]]:
+        """Settings for the quantities that miss their targets, at the largest time step at which all answers of these meet theirs.
 
         Empty if they do at none, the next one of which is tried if they come nearer to the target than before.
         """
-        nearest = math.inf
-        for share in OF_RESTITUTION:
-            step = _rounded(share * body.dt)
-            changes = body.for_restitution(self.wanted[REBOUND], step)
-            lively = body.changed(changes)
-            others = [rebound(lively, [step], answer.speed, REBOUND) for answer in answers if answer.quantity == REBOUND]
-            if all(map(self.meets, others)):
+        restitution, friction = (self.wanted[name] if name in missed else None for name in (REBOUND, COEFFICIENT))
+        tried, nearest = [answer for answer in answers if answer.quantity in missed], math.inf
+        for share in OF_RESTITUTION if tried else ():
+            step = _rounded(share * body.dt) if REBOUND in missed else body.dt
+            changes = body.for_contact(restitution, friction, step)
+            other = body.changed(changes)
+            found = [_of_contact(other, answer, step) for answer in tried]
+            if all(map(self.meets, found)):
                 text, elsewhere = body.patch(changes, step), body.elsewhere(step, changes)
-                return {other.speed: (Remedy(text, other.measured, other.unit, *elsewhere),) for other in others}
-            missed = max(abs(other.measured - self.wanted[REBOUND]) for other in others)
-            if not missed < nearest:
+                return {answer: (Remedy(text, one.measured, one.unit, *elsewhere),) for answer, one in zip(tried, found, strict=True)}
+            error = max(abs(one.measured - self.wanted[one.quantity]) for one in found)
+            if not error < nearest:
                 break
-            nearest = missed
+            nearest = error
         return {}
+
+
+def _of_contact(body: LooseBody, answer: Answer, dt: float) -> Answer:
+    """An answer that may have a target, of a body with other settings."""
+    return rebound(body, [dt], answer.speed, REBOUND) if answer.quantity == REBOUND else replace(answer, measured=body.friction)
 
 
 def _why_unmeasured(body: LooseBody) -> str:

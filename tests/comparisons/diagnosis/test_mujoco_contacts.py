@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from support.model_files import FREE, body_of, findings_of, ladder
+from support.model_files import FREE, PLANE, body_of, findings_of, ladder
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, MOVES, REBOUND, TIPS, Answer
 from dropspin.comparisons.diagnosis.inertia import inertia
@@ -250,15 +250,57 @@ def test_one_change_is_given_for_a_restitution_at_all_speeds(tmp_path, wanted, s
     """At the file's step, the damper for 0.3 gives 0.268 at 0.5 m/s and 0.296 at 3 m/s, that for 0.5 gives 0.507 and 0.5015."""
     body = body_of(tmp_path, BALL.format(""))
     missed = [answer.findings[0].remedies for answer in Targets(wanted).judged(body, impact(body, ladder(body))) if answer.findings]
-    assert {remedy.text for remedies in missed for remedy in remedies} == {body.patch(body.for_restitution(wanted, step), step)}
+    assert {remedy.text for remedies in missed for remedy in remedies} == {body.patch(body.for_contact(wanted, None, step), step)}
     assert [remedy.value for [remedy] in missed] == pytest.approx([wanted] * 3, abs=0.01)
+
+
+def test_pair_for_a_restitution_grips_as_a_contact_of_this_friction_does(tmp_path):
+    """A sphere that sticks keeps 5/7 of its speed along the floor; the same settings in its geometry leave 0.98 of it.
+
+    MuJoCo uses those of a normal force for friction, too, where it has no `solreffriction`.
+    """
+    import mujoco
+
+    ball, option = BALL.format('name="g"'), 'timestep=".001" cone="elliptic"'
+    body = body_of(tmp_path, ball, option)
+    [answer] = Targets(0.5).judged(body, [rebound(body, [body.dt], 1.0, REBOUND)])
+    pair = answer.findings[0].remedies[0].text
+    text = f'<mujoco>{pair}<option gravity="0 0 0" {option}/><worldbody>{PLANE}{ball}</worldbody></mujoco>'
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    data.qpos[2], data.qvel[[0, 2]] = 0.06, [1.0, -3.0]
+    mujoco.mj_step(model, data, 100)
+    assert data.qvel[[0, 2]] == pytest.approx([5.0 / 7.0, 1.5], rel=0.03)
+
+
+@pytest.mark.parametrize("condim", [1, 3])
+def test_missed_friction_has_a_remedy_of_its_own_and_one_together_with_the_restitution(tmp_path, condim):
+    body = body_of(tmp_path, BALL.format(f'name="g" condim="{condim}" priority="1" friction=".9 .01 .001"'))
+    answers = [rebound(body, [body.dt], 1.0, REBOUND), Answer("friction", COEFFICIENT, "1", measured=body.friction)]
+    alone = [answer for answer in Targets(None, 0.4).judged(body, answers) if answer.quantity == COEFFICIENT]
+    frictions = [(one.text, one.value) for one in alone[0].findings[0].remedies]
+    changes = {"friction": "0.4 0.4 0.01 0.001 0.001"} | ({"condim": 3} if condim == 1 else {})
+    assert frictions == [(body.patch(changes, body.dt), 0.4)]
+    both = [one for answer in Targets(0.5, 0.4).judged(body, answers) for finding in answer.findings for one in finding.remedies]
+    assert [one.value for one in both] == pytest.approx([0.5, 0.4], abs=0.01)
+    [text] = {one.text for one in both}
+    assert text.startswith('<contact><pair geom1="floor" geom2="g" friction="0.4 0.4 0.01 0.001 0.001" condim="3" solref=')
+
+
+def test_geometry_without_a_name_gets_one_for_its_pair(tmp_path):
+    body = body_of(tmp_path, BALL.format(""))
+    named = '<geom size=".05" mass="1" name="geometry 1 of b"/> (model.xml, line 1)'
+    text = body.patch(body.for_contact(0.5, None, body.dt), body.dt)
+    assert text.startswith(f'{named}, <contact><pair geom1="floor" geom2="geometry 1 of b" ')
 
 
 def test_settings_that_miss_the_wanted_restitution_are_no_remedy(tmp_path):
     """With a damping of 500 N s/m the ball is at rest after a few milliseconds, whatever its contact."""
     body = body_of(tmp_path, '<body name="b" pos="0 0 1"><joint type="free" damping="500"/><geom size=".1" mass="1"/></body>')
-    [answer] = Targets(0.5).judged(body, [rebound(body, [body.dt], 1.0, REBOUND)])
-    assert [(finding.kind, finding.remedies) for finding in answer.findings] == [("target", ())]
+    answers = [rebound(body, [body.dt], 1.0, REBOUND), Answer("friction", COEFFICIENT, "1", measured=body.friction)]
+    impact, friction = Targets(0.5, 0.4).judged(body, answers)
+    assert [(finding.kind, finding.remedies) for finding in impact.findings] == [("target", ())]
+    assert [one.value for one in friction.findings[0].remedies] == [0.4]
 
 
 def test_settings_for_a_restitution_are_those_that_override_what_the_geometry_says(tmp_path):

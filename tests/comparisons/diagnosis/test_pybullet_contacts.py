@@ -9,6 +9,7 @@ pytest.importorskip("pybullet", exc_type=ImportError)
 
 from support.urdf_files import BOX, body, joint, link, two_links
 
+from dropspin.comparisons.diagnosis.answers import COEFFICIENT, Answer
 from dropspin.comparisons.diagnosis.landing import rest
 from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
 from dropspin.comparisons.diagnosis.sliding import roll, slide
@@ -53,6 +54,17 @@ def test_slide_on_a_soft_contact_of_the_file_is_due_to_the_contact(tmp_path):
         assert [(one.text, one.value) for one in found.remedies] == [
             (box.patch({"stiffness": "none"}, STEP), pytest.approx(0.0201, rel=1e-2))
         ]
+
+
+def test_friction_for_a_target_is_that_of_every_link(tmp_path):
+    """The coefficient of a contact is the product with that of plane.urdf, which is 1."""
+    boxes = body(tmp_path, link(BOX), link(BOX, name="b"), joint("fixed", origin='<origin xyz="1 0 0"/>'))
+    [answer] = Targets(friction=0.8).judged(boxes, [Answer("friction", COEFFICIENT, "1", measured=boxes.friction)])
+    [remedy] = answer.findings[0].remedies
+    assert (remedy.text, remedy.value) == (
+        "for link in range(-1, getNumJoints(body)): changeDynamics(body, link, lateralFriction=0.8)",
+        pytest.approx(0.8, rel=1e-12),
+    )
 
 
 def test_rolling_friction_that_slows_a_ball_is_named_and_removed(tmp_path):

@@ -44,6 +44,8 @@ LEVEL = 0.1
 DEFAULT_CONTACT: Changes = {name: spelled(CONTACT[name].default) for name in ("solref", "solimp")}
 NO_FLUID: Changes = {"density": 0.0, "viscosity": 0.0}
 
+HIGH_IMPRATIO = 10.0
+"""The ratio of frictional to normal impedance that is tried as a remedy."""
 ENDS: Mapping[str, Callable[[Any, Any], bool]] = {"iterations": operator.lt, "ls_iterations": operator.lt, "tolerance": operator.gt}
 """Where MuJoCo's solver ends, and how a value compares with the default if the solver may end too early."""
 REMEDIES: Mapping[str, Changes] = {
@@ -53,7 +55,7 @@ REMEDIES: Mapping[str, Changes] = {
     "integrator": {"integrator": "RK4"},
     "eulerdamp": {"eulerdamp": "enable"},
     "cone": {"cone": "elliptic"},
-    "impratio": {"cone": "elliptic", "impratio": 10.0},
+    "impratio": {"cone": "elliptic", "impratio": HIGH_IMPRATIO},
     "margin": {"margin": 0.0},
     "frictionloss": {"frictionloss": 0.0},
     "condim": {"condim": 4},  # without rolling friction
@@ -121,7 +123,8 @@ class MuJoCoBody(LooseBody):
         of_contact = {"slide": (*ends, *contact), "roll": (*ends, *contact), "impact": (*ends, *softens), "rest": (*ends, *softens)}
         self.remedies = {**REMEDIES, **{name: {end: OPTION[end].default for end in ends} for name in ends}}
         is_explicit = alone.damping.any() and option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP and not option.integrator
-        idle = {name for name, acts in (("cone", option.cone != ELLIPTIC), ("eulerdamp", is_explicit)) if not acts}
+        acting = {"cone": option.cone != ELLIPTIC, "eulerdamp": is_explicit, "impratio": option.impratio < HIGH_IMPRATIO}
+        idle = {name for name, acts in acting.items() if not acts}
         if "cone" in idle:
             self.remedies = self.remedies | {"impratio": {"impratio": REMEDIES["impratio"]["impratio"]}}
         of_option = {question: tuple(name for name in names if name not in idle) for question, names in CAUSES.items()}

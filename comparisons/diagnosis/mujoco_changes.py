@@ -55,7 +55,10 @@ def ignored(text: BodyText, in_force: LooseBody, *, raised: bool, condim: int) -
     yield from _visual(text)
     if condim == 1 and "friction" in settings:
         yield "friction", settings["friction"], "not used: condim is 1"
-    for setting in text.frictions if condim > 1 else ():
+    frictions = [setting for setting in text.frictions if setting.file] if condim > 1 else []
+    if frictions and max(_friction(setting, 0) for setting in frictions) < in_force.friction:  # which nothing in the file says
+        yield "friction", frictions[0], f"not used for a slide: that of the other geometry, {in_force.friction:g}, is larger"
+    for setting in frictions:
         if unused := [name for name, (place, least, most) in FURTHER.items() if condim < least and _friction(setting, place) > most]:
             needed = " and ".join(f"{name} friction needs condim {FURTHER[name][1]}" for name in unused)
             is_first = setting == settings.get("friction")

@@ -73,6 +73,8 @@ class MuJoCoFile:
         if not 0.0 < self.model.opt.timestep <= LONGEST_STEP:
             written = option_setting(self.source, "option", "timestep", "")
             raise DropspinError(f"{given}: {written}: a time step must be above 0 and at most {LONGEST_STEP:g} s.")
+        if not np.isfinite(self.model.opt.gravity).all():
+            raise DropspinError(f"{given}: {option_setting(self.source, 'option', 'gravity', '')}: gravity must be three finite numbers.")
         self.compiled = placed(self.model)
         self.data = self.compiled[1]
         flags, bit = self.model.opt.disableflags, mujoco.mjtDisableBit

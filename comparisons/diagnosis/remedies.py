@@ -4,12 +4,12 @@ import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from itertools import combinations
 from typing import NamedTuple
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, DECAY_TIME, NOTEWORTHY, REBOUND, Answer, Finding, Kind, Remedy
-from dropspin.comparisons.diagnosis.landing import rebound
+from dropspin.comparisons.diagnosis.landing import IMPACTS, rebound
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.running.ablation import shares
@@ -82,6 +82,18 @@ class Targets(NamedTuple):
             nearest = error
         return {}
 
+    def kept(self, body: LooseBody, other: LooseBody, dt: float) -> bool:
+        """Whether a body with other settings, at a time step [s], rebounds as is wanted where the body does."""
+        if self.restitution is None:
+            return True
+        return all(self.meets(rebound(other, [dt], speed, REBOUND)) for speed in _met_speeds(self, body))
+
+
+@lru_cache(1)
+def _met_speeds(targets: Targets, body: LooseBody) -> list[float]:
+    """The speeds of impacts at which a body rebounds as is wanted [m/s]."""
+    return [speed for speed in IMPACTS if body.lands and targets.meets(rebound(body, [body.dt], speed, REBOUND))]
+
 
 def _of_contact(body: LooseBody, answer: Answer, dt: float) -> Answer:
     """An answer that may have a target, of a body with other settings."""
@@ -128,7 +140,8 @@ def answers_to(question: Question, body: LooseBody, targets: Targets = NO_TARGET
         explained = [_explained(body, finding, effect) for finding in answer.findings]
 
         def suitable(settings: tuple[str, ...], step: float, n: int = number, before: Answer = answer) -> list[Answer]:
-            return [other for other in again(settings, step)[n : n + 1] if targets.meets(other) or not targets.meets(before)]
+            others = [other for other in again(settings, step)[n : n + 1] if targets.meets(other) or not targets.meets(before)]
+            return others if targets.kept(body, body.tried(settings, step), step) else []
 
         findings = [_remedied(body, answer, finding, suitable) for finding in explained]
         yield replace(answer, findings=tuple(findings))

@@ -14,8 +14,8 @@ FIXED = ("fixed", "floating")
 """Types of joints of which PyBullet makes fixed ones."""
 
 OF_GAZEBO_AND_DRAKE = ("mu1", "mu2", "kp", "kd", "drake:mu_static", "drake:mu_dynamic")
-UNUSED = (*OF_GAZEBO_AND_DRAKE, "contact_cfm", "contact_erp", "contact_stiffness", "contact_damping")
-"""Settings of contacts for Gazebo and Drake, two that Bullet's loader reads and Bullet does not use, and two that it does not read."""
+UNUSED = (*OF_GAZEBO_AND_DRAKE, "contact_coefficients", "contact_cfm", "contact_erp", "contact_stiffness", "contact_damping")
+"""Settings of contacts for Gazebo and Drake, and of older files, two that Bullet's loader reads in vain, and two that it does not."""
 
 PACKAGES = ("package://", "model://")
 """How ROS and Gazebo begin paths in folders that they look up."""

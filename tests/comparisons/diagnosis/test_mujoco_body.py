@@ -299,12 +299,14 @@ def test_settings_of_contacts_that_neither_engine_reads_are_named(tmp_path):
     joints = joint.format("fixed", "fixed") + joint.format("continuous", "arm")
     gazebo = "<gazebo reference='{}'>\n<mu1>.2</mu1><contact_cfm/><contact_damping/><material>Gazebo/Red</material></gazebo>"
     text = f'<robot name="r">{links}{joints}{gazebo.format("base")}{gazebo.format("arm")}<gazebo><kp>1e6</kp></gazebo></robot>'
+    text = text.replace("<collision>", "<collision><contact_coefficients mu='.3'/>", 1)
     of_mujoco = body_of(tmp_path, text, name="base", file="model.urdf").ignored
     of_pybullet = PyBulletModel(tmp_path / "model.urdf", "model.urdf").body("base", None).ignored
     for ignored in (of_mujoco, of_pybullet):
         found = [(name, setting.text, setting.line) for name, setting, made in ignored if made == "not read"]
         drake_of_fixed = ("drake:mu_static of fixed", '<drake:mu_static value=".6">', 1)
         assert found == [
+            ("contact_coefficients", '<contact_coefficients mu=".3">', 1),
             ("mu1", "<mu1>", 2),
             ("contact_cfm", "<contact_cfm>", 2),
             ("contact_damping", "<contact_damping>", 2),

@@ -7,6 +7,7 @@ import pytest
 from support.model_files import FREE, PLANE, body_of, findings_of, ladder
 
 from dropspin.comparisons.diagnosis.answers import COEFFICIENT, MOVES, REBOUND, TIPS, Answer
+from dropspin.comparisons.diagnosis.flight import tumble
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.landing import impact, rebound, rest
 from dropspin.comparisons.diagnosis.remedies import Targets, answers_to
@@ -220,6 +221,21 @@ def test_time_step_that_resolves_no_motion_is_refused(tmp_path, step):
         DropspinError, match=rf'model.xml: timestep="{step}" \(model.xml, line 1\): a time step must be above 0 and at most'
     ):
         body_of(tmp_path, BALL.format(""), f'timestep="{step}"')
+
+
+@pytest.mark.parametrize(("wanted", "remedies"), [(0.5, 0), (None, 2)])
+def test_remedy_of_a_spin_keeps_the_restitution_that_is_met(tmp_path, wanted, remedies):
+    """The damper of a rebound is for Euler's method and one time step: with RK4 the box does not bounce."""
+    pair = '<contact><pair geom1="floor" geom2="g" solref="0 -300" solimp=".9999 .9999 .001 .5 2" solreffriction="0 -200"/></contact>'
+    box = FREE.format('<geom name="g" type="box" size=".09 .04 .02" mass=".25"/>')
+    body = body_of(tmp_path, box, 'timestep=".005"', head=pair)
+    [answer] = [answer for answer in answers_to(tumble, body, Targets(wanted)) if answer.findings]
+    assert [len(finding.remedies) for finding in answer.findings] == [remedies]
+
+
+def test_gravity_that_is_no_number_is_refused(tmp_path):
+    with pytest.raises(DropspinError, match=r'model.xml: gravity="0 0 nan" \(model.xml, line 1\): gravity must be three finite numbers'):
+        body_of(tmp_path, BALL.format(""), 'gravity="0 0 nan"')
 
 
 def test_body_without_a_result_is_not_a_sound_one():

@@ -407,6 +407,24 @@ def test_friction_that_the_dimension_of_a_contact_leaves_out_is_named(tmp_path, 
     assert body_of(tmp_path, plain).ignored == []
 
 
+@pytest.mark.parametrize(
+    ("own", "floor", "option", "is_unused"),
+    [
+        ('friction=".3"', "", "", True),
+        ('friction="0"', "", "", True),
+        ('friction=".3" priority="1"', "", "", False),
+        ('friction=".3"', 'friction=".8"', "", False),  # both are written
+        ('friction="1.2"', "", "", False),
+        ('friction=".3" condim="1"', 'condim="1"', "", False),
+        ('friction=".3"', "", '<option o_friction=".3 .3 .005 .0001 .0001"><flag override="enable"/></option>', False),
+    ],
+)
+def test_sliding_friction_below_the_default_of_the_floor_is_not_used(tmp_path, own, floor, option, is_unused):
+    world = f'<geom name="f" type="plane" size="1 1 .1" {floor}/>' + FREE.format(f'<geom size=".1" mass="1" {own}/>')
+    found = [(setting.text, made) for name, setting, made in body_of(tmp_path, world, on="f", head=option).ignored if "slide" in made]
+    assert found == [(own, "not used for a slide: that of the other geometry, 1, is larger")] * is_unused
+
+
 def test_friction_of_a_floor_that_the_dimension_of_a_contact_leaves_out_is_named(tmp_path):
     """The larger coefficients count: of the floor those of turning and rolling, of which four dimensions have the first alone."""
     floor, ball = 'friction="1 .5 .1"', '<geom size=".1" mass="1" condim="{}" friction="1 .02 .0001"/>'

@@ -79,7 +79,7 @@ def _largest(dt: float | None, tried: Sequence[ScanPoint], spin: float) -> str:
     """The largest time step that meets a condition, or, if none does, the smallest tested one with its failure mode."""
     if dt is None:
         return f"{_mode(tried[0])} at {duration(tried[0].value)}, the smallest tested"
-    turn = f", {spin * dt:.2g} rad" if spin else ""
+    turn = f" ({spin * dt:.2g} rad per step)" if spin else ""
     return duration(dt) + turn + (", the largest tested" if dt == tried[-1].value else "")
 
 
@@ -154,4 +154,6 @@ def _refinement(engine: str, points: Sequence[ScanPoint]) -> str:
     tried = [f"{mode} at {', '.join(duration(point.value) for point in group)}" for mode, group in groupby(smaller, _mode)]
     sentence += f" Smaller time steps tried: {'; '.join(tried)}."
     last = smaller[-1]
-    return sentence if last.mode == "sound" else f"{sentence} At {duration(last.value)}, the smallest tried, {last.diagnosis.message}."
+    if last.mode == "sound":
+        return f"{sentence} With --dt {last.value:g} ranges are those around a sound run."
+    return f"{sentence} At {duration(last.value)}, the smallest tried, {last.diagnosis.message}."

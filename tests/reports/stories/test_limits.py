@@ -43,7 +43,12 @@ def study():
 
 def test_tables_of_largest_steps_and_of_sound_ranges(study):
     assert limits.step_rows([study]) == [
-        {"scene": "spin-principal", "engine": "a", "accurate up to": "1 s, 5 rad", "stable up to": "10 s, 50 rad, the largest tested"}
+        {
+            "scene": "spin-principal",
+            "engine": "a",
+            "accurate up to": "1 s (5 rad per step)",
+            "stable up to": "10 s (50 rad per step), the largest tested",
+        }
     ]
     ranges = limits.range_rows(study)
     assert ranges[0] == {
@@ -101,7 +106,7 @@ def test_figure_of_an_axis_that_does_not_change_the_motion_does_not_call_engines
 def test_engine_that_is_accurate_at_no_step_has_the_smallest_one_tried():
     study = LimitsStudy(SPIN, 5e-3, 0.1, (scan("a", ["inaccurate", "inaccurate", "diverged"], "step"),), {}, {})
     [row] = limits.step_rows([study])
-    assert (row["accurate up to"], row["stable up to"]) == ("inaccurate at 1 s, the smallest tested", "10 s, 50 rad")
+    assert (row["accurate up to"], row["stable up to"]) == ("inaccurate at 1 s, the smallest tested", "10 s (50 rad per step)")
 
 
 def test_engine_that_is_not_sound_at_the_nominal_values_has_the_smaller_steps_tried(study):
@@ -110,7 +115,7 @@ def test_engine_that_is_not_sound_at_the_nominal_values_has_the_smaller_steps_tr
     study.refinements.update(never=never, crashing=(points_of("crashed", "no such thing"),))
     assert limits.sentences(study) == [
         "b is not sound at the nominal values and dt = 5 ms: inaccurate, it is off by 0.2 rad (tolerance 0.1). "
-        "Smaller time steps tried: sound at 2.5 ms.",
+        "Smaller time steps tried: sound at 2.5 ms. With --dt 0.0025 ranges are those around a sound run.",
         "never is not sound at the nominal values and dt = 5 ms: inaccurate, it is off by 0.2 rad (tolerance 0.1). "
         "Smaller time steps tried: gains energy at 2.5 ms; inaccurate at 1.25 ms. At 1.25 ms, the smallest tried, it is off by 0.15 rad.",
         "crashing is not sound at the nominal values and dt = 5 ms: crashed, no such thing. No smaller time step was tried.",

@@ -99,7 +99,7 @@ def calibrate(
         The settings, the reason for each, programs to paste, and the results measured with them.
 
     Raises:
-        DropspinError: The engine has no such settings, or broke down with them.
+        DropspinError: The engine has no such settings, broke down with them, or is unstable at this time step.
     """
     entry, scene = present_entry(engine), drop(restitution, friction, shape)
     verify_time_step(scene, dt)
@@ -110,6 +110,9 @@ def calibrate(
         raise DropspinError(f"{entry.label} {failure}: {result.reason}.")
     if result is None:
         raise DropspinError(f"{entry.label} has no settings to calibrate; use mujoco or pybullet.")
+    stable = result.measured[-1]
+    if math.isnan(stable.value):
+        raise DropspinError(f"{entry.label} has no usable settings for this time step: {stable.how}; give a smaller one.")
     return result
 
 
@@ -150,6 +153,7 @@ def measurements(motion: Motion, dt: float) -> list[Measured]:
     rests = float(np.ptp(low)) < 0.1 * LOW_DROP
     if not rests:
         low, slow = np.full_like(low, np.nan), np.full_like(slow, np.nan)
+    steady = np.linspace(low[0], low[-1], len(low))
     half, _, _ = _bounces(motion, dt / 2.0)
     at_impact = f"over {START_PHASES} drops from {DROP:g} m, whose impacts are spread evenly within a time step"
     at_rest = f"dropped from {1e3 * LOW_DROP:g} mm, in the fifth second" if rests else "the body does not come to rest within 5 s"
@@ -161,7 +165,8 @@ def measurements(motion: Motion, dt: float) -> list[Measured]:
         Measured("restitution by height", float(heights.mean()), "1", "√(rebound height / drop height), mean over these drops"),
         Measured("penetration", deepest, "m", f"largest of these drops; at impact the body falls {IMPACT * dt:.3g} m in one step"),
         Measured("depth at rest", float(-low.mean()), "m", at_rest),
-        Measured("jitter at rest", float(np.ptp(low)), "m", f"highest minus lowest position, {at_rest}"),
+        Measured("sinking at rest", float(low[0] - low[-1]) / WATCHED, "m/s", f"mean speed downwards, {at_rest}"),
+        Measured("jitter at rest", float(np.ptp(low - steady)), "m", f"highest minus lowest position beside this motion, {at_rest}"),
         Measured("speed at rest", float(np.abs(slow).max()), "m/s", f"greatest, {at_rest}"),
         Measured("restitution at half the step", float(half.mean()), "1", "with the same settings, which may be valid for one step only"),
         Measured("largest stable step", step, "s", how),
@@ -186,7 +191,7 @@ def _bounces(motion: Motion, dt: float) -> tuple[Array, Array, float]:
 def _largest_step(motion: Motion, dt: float) -> tuple[float, str]:
     """The largest time step at which a body neither gains energy nor sinks, and how it was found."""
     if not _is_stable(motion, dt):
-        return math.nan, f"unstable already at {dt:g} s: the body gains 2 % of its height, or stays {SUNK:g} m below the floor"
+        return math.nan, f"at {dt:g} s the body gains 2 % of its height, or stays {SUNK:g} m below the floor"
     stable = dt
     while (longer := min(2.0**0.125 * stable, LARGEST_STEP)) > stable and _is_stable(motion, longer):
         stable = longer

@@ -33,7 +33,7 @@ class KnownBugs(Study):
         blank = Outcome(release="", state="not run")
         return [
             {"case": bug.name, "kind": bug.kind, "reference": bug.reference, "command": bug.command if bug.label else ""}
-            | {"metric": bug.metric, "verdict": words(bug, result)}
+            | {"metric": bug.metric, "verdict": words(bug, result, self.outcomes[bug.name])}
             | outcome.model_dump()
             for bug, result in self.verdicts()
             for outcome in self.outcomes[bug.name] or [blank]
@@ -45,7 +45,10 @@ class KnownBugs(Study):
         parts: list[Part] = []
         for bug, outcome in verdicts:
             parts += _of_bug(bug, outcome, self.outcomes[bug.name], on_terminal=len(self.bugs) <= FEW)
-        table = [{"case": bug.name, "engine": bug.engine or "–", "verdict": words(bug, outcome)} for bug, outcome in verdicts]
+        table = [
+            {"case": bug.name, "engine": bug.engine or "–", "verdict": words(bug, found, self.outcomes[bug.name])}
+            for bug, found in verdicts
+        ]
         parts += [Heading("All cases"), Table(table), Paragraph(_summary(verdicts))]
         return Document("Known bugs", parts)
 
@@ -56,7 +59,7 @@ def _of_bug(bug: Bug, result: Verdict, outcomes: Sequence[Outcome], *, on_termin
     if bug.label:
         parts += [Paragraph(f"Closed form: {bug.closed_form}."), Paragraph("Shown by:", bug.command)]
         parts += [Table([_row(bug, outcome) for outcome in outcomes]), Sentences(_said(bug, outcomes))]
-    parts.append(Paragraph(f"Verdict: {words(bug, result)}.", style="bold"))
+    parts.append(Paragraph(f"Verdict: {words(bug, result, outcomes)}.", style="bold"))
     return [replace(part, on_terminal=on_terminal) for part in parts]
 
 
@@ -77,8 +80,10 @@ def _said(bug: Bug, outcomes: Sequence[Outcome]) -> list[str]:
     return [*printed, *silent, *(f"{outcome.release}: {outcome.said}." for outcome in outcomes if outcome.state == "not run")]
 
 
-def words(bug: Bug, result: Verdict) -> str:
+def words(bug: Bug, result: Verdict, outcomes: Sequence[Outcome]) -> str:
     """A verdict in words."""
+    if result.kind == "not run" and len({outcome.state for outcome in outcomes}) > 1:
+        return "; ".join(f"{outcome.release} {outcome.state}" for outcome in outcomes)
     if result.kind == "fixed":
         return f"does not occur from release {result.since} on"
     return f"not expressible: {bug.why_not}" if result.kind == "not expressible" else result.kind
@@ -89,9 +94,10 @@ def _summary(verdicts: Sequence[tuple[Bug, Verdict]]) -> str:
     kinds = Counter(verdict.kind for _, verdict in verdicts)
     catalogue = sum(verdict.kind in ("shown", "fixed") and not bug.silent for bug, verdict in verdicts)
     of_these = f"{kinds['fixed']} fixed in a later release and {catalogue} detected by a check of the catalogue's scenes"
-    parts = [f"{kinds['shown'] + kinds['fixed']} reproduced (of these, {of_these})"]
+    parts = [f"{kinds['shown'] + kinds['fixed']} shown (of these, {of_these})"]
     parts += [f"{kinds[kind]} {kind}" for kind in ("not shown", "not expressible", "not run") if kinds[kind]]
-    return f"{counted(len(verdicts), 'case')}: {', '.join(parts)}."
+    missing = " A release without an environment is not run; --prepare makes it." if kinds["not run"] else ""
+    return f"{counted(len(verdicts), 'case')}: {', '.join(parts)}.{missing}"
 
 
 def exit_code(verdicts: Sequence[tuple[Bug, Verdict]]) -> int:

@@ -224,6 +224,20 @@ def test_spring_over_n_steps_has_the_depth_of_a_half_wave():
     assert value(found, "largest stable step") > 5e-3
 
 
+def test_calibration_at_a_time_step_that_is_unstable_is_an_error():
+    """At 0.5 s a ball is 4.9 m below the floor in some steps, although the speeds of its impact have the restitution."""
+    with pytest.raises(DropspinError, match=r"mujoco has no usable settings for this time step: at 0\.5 s the body gains 2 %"):
+        calibrate(engine("mujoco"), 0.7, 0.5)
+
+
+@pytest.mark.usefixtures("without_step_search")
+def test_sinking_on_a_damper_is_told_from_jitter():
+    """A damper (1 + e)/dt holds a ball up that sinks by g dt²/(1 + e) (1 - d)/d in a step, with an impedance d of 0.9999."""
+    found = calibrate(engine("mujoco"), 0.7, 2e-3)
+    assert value(found, "sinking at rest") == pytest.approx(9.81 * 2e-3 / 1.7 * 1e-4, rel=1e-3)
+    assert value(found, "jitter at rest") < 1e-12
+
+
 @pytest.mark.parametrize(
     ("name", "given", "message"),
     [

@@ -16,6 +16,8 @@ from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.record.bugs import FILE, Bug, Outcome, Verdict, load_bugs, measure, prepare, state_of, verdict
 from dropspin.comparisons.record.environments import run
 from dropspin.comparisons.record.plan import load_plan
+from dropspin.reports.document import Paragraph
+from dropspin.reports.stories.bugs import KnownBugs
 from dropspin.scenarios import UnknownName, load
 
 BUG = Bug(name="a", reference="", year=2020, kind="", symptom="", label="wang", fault=(-0.97, -0.95), sound=1e-3, releases=("1.0", "1.1"))
@@ -163,3 +165,13 @@ def test_a_case_has_the_value_of_the_scene_that_the_fault_leaves_right(tmp_path)
     assert row["right"] == pytest.approx(1.5e-3, rel=0.01)
     page = (tmp_path / "out/bugs/bugs.md").read_text(encoding="utf-8")
     assert "| 0.184 | 0.1 to 0.3 | ± 0.01 | 1.50e-03 | shown |" in page
+
+
+def test_report_of_which_some_releases_were_run_tells_what_they_show():
+    page = KnownBugs(bugs=[BUG.model_copy(update={"metric": "energy_error"})], outcomes={"a": outcomes("shown", "not run")})
+    [row, *_] = page.rows()
+    assert row["verdict"] == "1.0 shown; 1.1 not run"
+    assert page.document().parts[-1] == Paragraph(
+        "1 case: 0 shown (of these, 0 fixed in a later release and 0 detected by a check of the catalogue's scenes), 1 not run. "
+        "A release without an environment is not run; --prepare makes it."
+    )

@@ -138,10 +138,11 @@ def _compared_in_part(study: LimitsStudy) -> list[str]:
         points = [point for scan in study.scans if scan.axis.label == label for point in scan.points]
         ends = {point.value: until for point in points if (until := point.diagnosis.compared_until) is not None}
         if ends:
-            where = f"{counted(len(ends), 'value', 'values')}, {min(ends):.4g} to {max(ends):.4g},"
-            earliest, latest = duration(min(ends.values())), duration(max(ends.values()))
-            ending = f"the exact solution ends before the motion, after {earliest} to {latest}; later errors are not judged"
-            found.append(f"Axis {label}: at {where} {ending}.")
+            where = (
+                f"{counted(len(ends), 'value', 'values')}, {' to '.join(dict.fromkeys(f'{one:.4g}' for one in (min(ends), max(ends))))},"
+            )
+            times = " to ".join(dict.fromkeys(map(duration, (min(ends.values()), max(ends.values())))))
+            found.append(f"Axis {label}: at {where} the exact solution ends before the motion, after {times}; later errors are not judged.")
     return found
 
 

@@ -1,5 +1,6 @@
 """Progress and status on standard error: bars on a terminal, plain lines elsewhere. Each update stops an interrupted command."""
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -14,6 +15,10 @@ from dropspin.reports.stories.numbers import in_ms
 from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe_output import echo, safe, styled
 from dropspin.scenarios.text import counted
+
+
+EVERY, SELDOM = 5.0, 10.0
+"""Times between two lines of a sweep, and of other work [s]."""
 
 
 class RunProgress:
@@ -71,24 +76,21 @@ def status(text: str) -> Iterator[None]:
 
 @contextmanager
 def share_bar(title: str) -> Iterator[Callable[[str, float], None]]:
-    """A progress bar on a terminal; elsewhere, one line when the work begins, so that bad input is one line."""
-    has_begun = False
+    """A progress bar on a terminal; elsewhere, a line when the work begins, so that bad input is one line, and one every few seconds."""
+    last = -math.inf
 
     def on_progress(work: str, share: float) -> None:
-        nonlocal has_begun
+        nonlocal last
         stop_if_interrupted()
-        if bar.disable and not has_begun:
-            echo(f"working on {title}", err=True)
-        has_begun = True
+        now = time.monotonic()
+        if bar.disable and now - last >= SELDOM:
+            echo(f"working on {title}" + f": {share:.0%}, {work}" * math.isfinite(last), err=True)
+            last = now
         bar.update(task, completed=share, description=safe(f"{title}: {work}"))
 
     with _bar(BarColumn(), TimeRemainingColumn()) as bar:
         task = bar.add_task(safe(title), total=1.0)
         yield on_progress
-
-
-EVERY = 5.0
-"""Time between two lines [s]."""
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import dropspin as ds
 from dropspin.reports.plots.colours import human_label
 from dropspin.reports.stories.matrix import MOST_SCENES, shown_scenes
 from dropspin.reports.stories.run import overview
+from dropspin.reports.terminal.progress import share_bar
 from dropspin.reports.terminal.rows import print_rows, print_sentence
 from dropspin.reports.terminal.run_table import print_table
 
@@ -185,3 +186,12 @@ def test_sentence_is_not_broken_between_a_number_and_its_unit(capsys, width):
     assert " ".join(lines) == sentence
     assert max(map(len, lines)) <= width
     assert not any(re.search(r"\d$", line) for line in lines[:-1])
+
+
+def test_long_work_that_is_not_on_a_terminal_has_a_line_every_few_seconds(capsys, monkeypatch):
+    now = iter([0.0, 3.0, 11.0, 12.0, 25.0])
+    monkeypatch.setattr("dropspin.reports.terminal.progress.time.monotonic", lambda: next(now))
+    with share_bar("a scene") as on_progress:
+        for number in range(5):
+            on_progress(f"part {number}", 0.2 * number)
+    assert capsys.readouterr().err.splitlines() == ["working on a scene", "working on a scene: 40%, part 2", "working on a scene: 80%, part 4"]

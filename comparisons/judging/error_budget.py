@@ -212,7 +212,7 @@ def growing(budget: ErrorBudget, finest: float, noise: float) -> ErrorBudget:
     """The budget of an error that grows with finer time steps: at least the error at the finest of them, less its noise, remains."""
     least = finest - math.copysign(ABOVE_NOISE * noise, finest)
     lower, upper = (least, max(budget.upper, finest)) if finest > 0.0 else (min(budget.lower, finest), least)
-    reason = "grows at least as fast as 1/dt at the finest time steps, which show no limit"
+    reason = "that of the finest time step; it grows at least as fast as 1/dt, without a limit"
     return ErrorBudget("model", reason, finest, lower, upper)
 
 

@@ -51,6 +51,7 @@ class Finding(NamedTuple):
         detail: Part of a sentence that explains the finding.
         tried: The names of settings that were each changed, and none of which removes an error of the engine.
         shares: If several settings act, the share of each in the effect; settings that act only together have one share, as `a, b`.
+        removes_error: Whether changes of settings remove an error, not an effect of settings on the exact solution.
     """
 
     kind: Kind
@@ -59,6 +60,7 @@ class Finding(NamedTuple):
     detail: str = ""
     tried: tuple[str, ...] = ()
     shares: tuple[tuple[str, float], ...] = ()
+    removes_error: bool = False
 
     @property
     def is_error(self) -> bool:

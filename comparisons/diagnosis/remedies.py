@@ -190,7 +190,8 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
     settings = finding.settings if finding.shares else (next(iter(found)) or ("timestep",)) + unchanged
     if finding.is_error:
         settings = tuple(name for name in finding.settings if name in changed)
-    return finding._replace(kind=kind, settings=settings, remedies=tuple(found.values()))
+    removes = finding.is_error and kind == "setting"
+    return finding._replace(kind=kind, settings=settings, remedies=tuple(found.values()), removes_error=removes)
 
 
 def _tries(body: LooseBody, answer: Answer, finding: Finding) -> Iterator[tuple[tuple[str, ...], float]]:

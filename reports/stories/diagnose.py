@@ -220,7 +220,7 @@ def _remedies(*same: tuple[Answer, Finding]) -> Iterator[str]:
 def _value_after(remedy: Remedy, answer: Answer) -> str:
     """The value measured with a remedy. For a spin without a decay time, it is the fraction left after 1 s."""
     value = _value(remedy.value, remedy.unit)
-    return value if remedy.unit == answer.unit else f"a spin of which the fraction {value} is left after 1 s"
+    return value if remedy.unit == answer.unit else f"a fraction of {value} kept in 1 s"
 
 
 def _statement(pair: tuple[Answer, Finding]) -> str:
@@ -234,7 +234,7 @@ def _statement(pair: tuple[Answer, Finding]) -> str:
     if finding.detail:
         of_error = f" instead of {in_force}" if finding.is_error and in_force and math.isnan(answer.measured) else ""
         return f"is {measured}{of_error}, {finding.detail}" if measured else f"of the simulation: {finding.detail}"
-    wanted = in_force if finding.is_error and in_force else physical
+    wanted = in_force if (finding.is_error or finding.removes_error) and in_force else physical
     limit = f", {_value(answer.limit, answer.unit)} as dt → 0" if finding.kind == "time step" and math.isfinite(answer.limit) else ""
     shares = f" ({explained_by(dict(finding.shares), 'of the difference')})" if finding.shares else ""
     return f"is {measured}" + (f" instead of {wanted}" if wanted else "") + limit + shares

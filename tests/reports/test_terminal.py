@@ -194,4 +194,8 @@ def test_long_work_that_is_not_on_a_terminal_has_a_line_every_few_seconds(capsys
     with share_bar("a scene") as on_progress:
         for number in range(5):
             on_progress(f"part {number}", 0.2 * number)
-    assert capsys.readouterr().err.splitlines() == ["working on a scene", "working on a scene: 40%, part 2", "working on a scene: 80%, part 4"]
+    assert capsys.readouterr().err.splitlines() == [
+        "working on a scene",
+        "working on a scene: 40%, part 2",
+        "working on a scene: 80%, part 4",
+    ]

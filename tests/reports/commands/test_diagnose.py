@@ -35,7 +35,7 @@ def test_table_findings_and_files_of_several_bodies(model):
     [impossible] = [line for line in lines if line.startswith("heavy: Inertia, impossible")]
     assert 'diaginertia="1 1 1" (two.xml, line 2)' in impossible
     [spin] = [line for line in lines if line.startswith("damped: Spin, setting:")]
-    assert spin.endswith("Remedy, tried: <freejoint/> (two.xml, line 3) gives a spin of which the fraction 1 is left after 1 s.")
+    assert spin.endswith("Remedy, tried: <freejoint/> (two.xml, line 3) gives a fraction of 1 kept in 1 s.")
     folder = model / "out/diagnosis"
     assert {"report.html", "diagnosis.json", "diagnosis.csv", "diagnosis.md", "diagnosis.parquet"} <= {
         path.name for path in folder.iterdir()

@@ -16,7 +16,6 @@ from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe_output import echo, safe, styled
 from dropspin.scenarios.text import counted
 
-
 EVERY, SELDOM = 5.0, 10.0
 """Times between two lines of a sweep, and of other work [s]."""
 

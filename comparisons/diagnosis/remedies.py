@@ -84,15 +84,17 @@ class Targets(NamedTuple):
 
     def kept(self, body: LooseBody, other: LooseBody, dt: float) -> bool:
         """Whether a body with other settings, at a time step [s], rebounds as is wanted where the body does."""
-        if self.restitution is None:
-            return True
-        return all(self.meets(rebound(other, [dt], speed, REBOUND)) for speed in _met_speeds(self, body))
+        with suppress(Diverged):
+            return self.restitution is None or all(self.meets(rebound(other, [dt], speed, REBOUND)) for speed in _met_speeds(self, body))
+        return False
 
 
 @lru_cache(1)
 def _met_speeds(targets: Targets, body: LooseBody) -> list[float]:
     """The speeds of impacts at which a body rebounds as is wanted [m/s]."""
-    return [speed for speed in IMPACTS if body.lands and targets.meets(rebound(body, [body.dt], speed, REBOUND))]
+    with suppress(Diverged):
+        return [speed for speed in IMPACTS if body.lands and targets.meets(rebound(body, [body.dt], speed, REBOUND))]
+    return []
 
 
 def _of_contact(body: LooseBody, answer: Answer, dt: float) -> Answer:
@@ -141,7 +143,7 @@ def answers_to(question: Question, body: LooseBody, targets: Targets = NO_TARGET
 
         def suitable(settings: tuple[str, ...], step: float, n: int = number, before: Answer = answer) -> list[Answer]:
             others = [other for other in again(settings, step)[n : n + 1] if targets.meets(other) or not targets.meets(before)]
-            return others if targets.kept(body, body.tried(settings, step), step) else []
+            return others if others and targets.kept(body, body.tried(settings, step), step) else []
 
         findings = [_remedied(body, answer, finding, suitable) for finding in explained]
         yield replace(answer, findings=tuple(findings))

@@ -72,11 +72,14 @@ class Targets(NamedTuple):
             step = _rounded(share * body.dt) if REBOUND in missed else body.dt
             changes = body.for_contact(restitution, friction, step)
             other = body.changed(changes)
-            found = [_of_contact(other, answer, step) for answer in tried]
-            if all(map(self.meets, found)):
+            found = {
+                answer: _rebound(other, step, answer.speed) if answer.quantity == REBOUND else replace(answer, measured=other.friction)
+                for answer in tried
+            }
+            if all(map(self.meets, found.values())):
                 text, elsewhere = body.patch(changes, step), body.elsewhere(step, changes)
-                return {answer: (Remedy(text, one.measured, one.unit, *elsewhere),) for answer, one in zip(tried, found, strict=True)}
-            error = max(abs(one.measured - self.wanted[one.quantity]) for one in found)
+                return {answer: (Remedy(text, one.measured, one.unit, *elsewhere),) for answer, one in found.items()}
+            error = max(abs(one.measured - self.wanted[one.quantity]) for one in found.values())
             if not error < nearest:
                 break
             nearest = error
@@ -84,22 +87,20 @@ class Targets(NamedTuple):
 
     def kept(self, body: LooseBody, other: LooseBody, dt: float) -> bool:
         """Whether a body with other settings, at a time step [s], rebounds as is wanted where the body does."""
-        with suppress(Diverged):
-            return self.restitution is None or all(self.meets(rebound(other, [dt], speed, REBOUND)) for speed in _met_speeds(self, body))
-        return False
+        return self.restitution is None or all(self.meets(_rebound(other, dt, speed)) for speed in _met_speeds(self, body))
 
 
 @lru_cache(1)
 def _met_speeds(targets: Targets, body: LooseBody) -> list[float]:
     """The speeds of impacts at which a body rebounds as is wanted [m/s]."""
+    return [speed for speed in IMPACTS if body.lands and targets.meets(_rebound(body, body.dt, speed))]
+
+
+def _rebound(body: LooseBody, dt: float, speed: float) -> Answer:
+    """The rebound of a body at the speed of an impact [m/s]; NaN if its simulation breaks down."""
     with suppress(Diverged):
-        return [speed for speed in IMPACTS if body.lands and targets.meets(rebound(body, [body.dt], speed, REBOUND))]
-    return []
-
-
-def _of_contact(body: LooseBody, answer: Answer, dt: float) -> Answer:
-    """An answer that may have a target, of a body with other settings."""
-    return rebound(body, [dt], answer.speed, REBOUND) if answer.quantity == REBOUND else replace(answer, measured=body.friction)
+        return rebound(body, [dt], speed, REBOUND)
+    return Answer("impact", REBOUND, "1", speed=speed)
 
 
 def _why_unmeasured(body: LooseBody) -> str:

@@ -130,7 +130,7 @@ class MuJoCoFile:
 
     def others(self, chosen: Sequence[str]) -> str:
         """The bodies with mass beside some that are chosen, why they are not free, and what to do; empty if there are none."""
-        names = [name for name in self._heavy if name not in chosen and self.model.body_mocapid[self.heads[name]] < 0]
+        names = [name for name in self._heavy if name not in chosen]
         verbs = ("moves", "carries", "is") if len(names) == 1 else ("move", "carry", "are")
         are = "{} on joints, {} others on joints or {} tied".format(*verbs)
         there = f"{', '.join(names[:MOST_NAMES])}{' and others' * (len(names) > MOST_NAMES)} {are}"
@@ -138,8 +138,9 @@ class MuJoCoFile:
 
     @cached_property
     def _heavy(self) -> list[str]:
-        """The names of the bodies that move and have mass."""
-        return [name for name, body in self.heads.items() if self.model.body_mass[self.group(body)].sum() > 0.0]
+        """The names of the bodies that move, not by `mocap`, and have mass."""
+        moved, mass = self.model.body_mocapid, self.model.body_mass
+        return [name for name, body in self.heads.items() if moved[body] < 0 and mass[self.group(body)].sum() > 0.0]
 
     def runs(self, dt: float, changes: Changes) -> bool:
         """Whether the whole model runs for a tenth of a second with other options."""

@@ -234,6 +234,7 @@ def test_welded_parts_and_an_offset_centre_move_as_in_mujoco(tmp_path):
         ('<mujoco><worldbody><body><freejoint/><geom size="-1"/></body></worldbody></mujoco>', "MuJoCo does not compile it"),
         ('<mujoco><worldbody><body><freejoint/><geom size="nan"/></body></worldbody></mujoco>', "MuJoCo does not compile it"),
         ("<mujoco/>", "no body both moves and has mass"),
+        ('<mujoco><worldbody><body mocap="true"><geom size=".1"/></body></worldbody></mujoco>', "no body both moves and has mass"),
         ('<mujoco><worldbody><body name="arm"><joint/><geom size=".1"/></body></worldbody></mujoco>', "--loose"),
         ('<robot name="r"><link name="b"/></robot>', "give a link a mass above 0"),
         ('<robot name="r"><link name="a"/><link name="b"/></robot>', r"has 2 links without a parent \(a, b\); a URDF file has one"),

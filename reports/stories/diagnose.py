@@ -126,7 +126,7 @@ def _overview(body: BodyDiagnosis) -> dict[str, str]:
     return {
         "body": body.name,
         "engine": body.engine,
-        "mass": f"{body.mass:.3g} kg",
+        "mass": "–" if math.isnan(body.mass) else f"{body.mass:.3g} kg",
         "lands on": body.surface or "–",
         "findings": ", ".join(filter(None, [body.breakdown, findings])) or "none",
     }

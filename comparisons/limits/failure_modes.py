@@ -11,9 +11,9 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
-from dropspin.comparisons.measuring.metrics import greatest_rise_error, metrics_for
+from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.scenarios import Scenario, Trajectory, Truth
-from dropspin.scenarios.mechanics import depth_of, lowest_height, offset_of
+from dropspin.scenarios.mechanics import apex, depth_of, lowest_height, offset_of
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.rotations import length
 from dropspin.scenarios.state import Array
@@ -147,11 +147,7 @@ def _errors(motion: ExtendedMotion, case: Comparison, within: float) -> Iterator
         try:
             size = abs(metric.value([case]))
         except Unresolved:
-            if metric.name != "bounce_height_error" or not case.impacts:
-                continue
-            try:  # the flight after the impact has too few steps to measure in its middle
-                size = abs(greatest_rise_error(case))
-            except Unresolved:
+            if metric.name != "bounce_height_error" or math.isnan(size := _rise_error(case)):
                 continue
         if metric.name == "restitution_error" and math.isnan(size):
             continue  # undefined for an exact motion at the coarsest steps too; a body without an impact has other errors
@@ -165,6 +161,19 @@ def _errors(motion: ExtendedMotion, case: Comparison, within: float) -> Iterator
             why = ": no impact was detected" if case.first_contact is None else ""
             message = value if math.isfinite(size) else f"{name} is undefined{why}"
             yield Diagnosis("inaccurate", metric.name, size if math.isfinite(size) else math.inf, message)
+
+
+def _rise_error(case: Comparison) -> float:
+    """How far the greatest heights after the first impact differ, relative to the drop; of each state the one to which it rises.
+
+    NaN without a state after it. A body that falls, because its impact is late, counts with the height that it has.
+    """
+    since = case.exact.t > min(case.impacts, default=math.inf)
+    heights = [
+        np.where(motion.velocity[:, 1] > 0.0, apex(case.scene, motion), motion.position[:, 1])[since]
+        for motion in (case.compared, case.exact)
+    ]
+    return abs(float(heights[0].max() - heights[1].max())) / case.clearance if since.any() else math.nan
 
 
 def _between_rows(case: Comparison) -> float:

@@ -194,22 +194,19 @@ class Comparison:
         return self.flights
 
     @cached_property
-    def is_low(self) -> bool:
-        """Whether the exact body rises after its first impact by at most `LOW` of the drop."""
-        fallen = self.exact[self.exact.t > self.impacts[0]] if self.impacts else self.exact[:0]
-        return len(fallen) > 0 and bool(apex(self.scene, fallen).max() - fallen.position[0, 1] <= LOW * self.clearance)
-
-    @cached_property
-    def greatest_apexes(self) -> tuple[float, float]:
+    def greatest_apexes(self) -> tuple[float, float] | None:
         """The greatest apex height of the motion after its first contact, and that of the exact body after its first impact [m].
 
+        None if the exact body rises after its first impact by more than `LOW` of the drop.
+
         Raises:
-            Unresolved: The first contact begins after the end of the exact solution, or nothing is known after it.
+            Unresolved: The first contact begins after the end of the exact solution.
         """
         fallen = self.exact[self.exact.t > self.impacts[0]] if self.impacts else self.exact[:0]
-        if not len(fallen):
-            raise Unresolved("the exact solution ends with the first impact")
-        last, exact = len(self.compared) - 1, apex(self.scene, fallen)
+        exact = apex(self.scene, fallen)
+        if not len(fallen) or exact.max() - fallen.position[0, 1] > LOW * self.clearance:
+            return None
+        last = len(self.compared) - 1
         before, after = self.first_contact or (0, last + 1 - len(fallen))
         if before >= last:
             raise Unresolved("the first contact begins after the end of the exact solution")

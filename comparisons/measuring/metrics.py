@@ -84,12 +84,6 @@ def energy_gain(case: Comparison | Motions) -> Array:
     return motions.energy_gained / case.energy_scale
 
 
-def greatest_rise_error(case: Comparison) -> float:
-    """Greatest apex height of the centre of mass after the first contact minus the exact one, relative to the drop height."""
-    actual, exact = case.greatest_apexes
-    return (actual - exact) / case.clearance
-
-
 @_metric("1", "truth", requirements.has_apex, signed=True, agreement=True, first_flight=True)
 def bounce_height_error(case: Comparison) -> float:
     """Apex height of the centre of mass after the first impact minus the exact apex height, relative to the drop height.
@@ -97,8 +91,8 @@ def bounce_height_error(case: Comparison) -> float:
     If the exact body rises by less than 1 % of the drop height, because it rests, slides, rolls or turns on the floor, the apex is the
     greatest height that the body reaches, or would reach in free flight, at any time after its own first contact.
     """
-    if case.is_low:
-        return greatest_rise_error(case)
+    if (apexes := case.greatest_apexes) is not None:
+        return (apexes[0] - apexes[1]) / case.clearance
     rows = case.flights_with_impact[1]
     actual, exact = (apex(case.scene, motion[rows]) for motion in (case.compared, case.exact))
     return float(np.mean(actual - exact)) / case.clearance

@@ -167,14 +167,13 @@ def _distance(scene: Scenario) -> float:
 def _pairs(entry: EngineEntry, scene: Scenario, dt: float, rows: Array, name: str, batch: Sequence[Array]) -> tuple[Pairs, Effects | None]:
     """The motions that should be equal, and the function that measures effects of rounding; None if it has no effect."""
     effects = partial(effects_of_rounding, entry, scene, dt, rows)
-    if name == AGAIN:
-        return [(rows, states_of(entry, scene, dt))], None
+    if name == AGAIN:  # twice, for an engine may alternate between two motions
+        return [(rows, states_of(entry, scene, dt)) for _ in range(2)], None
     if name in SYMMETRIES:
         return _transformed(entry, scene, dt, rows, SYMMETRIES[name])
     if name == HALVES:
         return _halves(entry, scene, dt, rows)
     if name == BATCH:
-        # A compiler vectorises a batch differently from a single simulation, and rounding depends on that.
         # A compiler vectorises a batch differently from a single simulation, and rounding depends on that.
         before = batch or [rows, *(states_of(entry, other, dt) for other in _others(entry, scene))]
         return list(zip(before, _batch(entry, scene, dt), strict=True)), effects if entry.adapter.compiles else None

@@ -51,6 +51,21 @@ def test_engine_that_does_not_repeat_its_motion_says_nothing_of_symmetries(preci
     assert reasons == {"the engine does not repeat its own motion, so that a difference from another one says nothing of a symmetry"}
 
 
+@pytest.mark.parametrize("first", [0, 1])
+def test_engine_that_alternates_between_two_motions_does_not_repeat_its_own(first):
+    """Perturbed starts are an even number of runs apart, or an odd one: what alternates would be attributed to rounding."""
+
+    class Alternating(made.Exact):
+        compiles, runs = True, first
+
+        def prepare(self, scene, dt):
+            type(self).runs += 1
+            push = 0.02 * (type(self).runs % 2) * np.eye(13)[1]
+            return made.ExactSimulation(scene, dt, lambda state, time: state + push)
+
+    assert statuses(Alternating(), "fall-spin")[AGAIN].status == "lost"
+
+
 def test_difference_that_a_repeated_run_has_too_is_not_attributed_to_rounding():
     """The fourth and later simulations of a process are displaced by 5e-8, and so are those from perturbed starts."""
 

@@ -227,6 +227,18 @@ def test_cause_of_one_error_that_is_hardly_known_or_of_one_that_rounding_exclude
     assert ("gravity" in [wrong.parameter.name for wrong in found]) == named
 
 
+@pytest.mark.parametrize(("factor", "named"), [(1.0, True), (3.0, True), (0.5, False), (-1.0, False)])
+def test_cause_of_more_than_an_error_that_a_limitation_may_cause_as_well_is_not_named(factor, named):
+    """A limitation may explain the rest of a larger error, and no part of a smaller one, or of one of the other sign."""
+    results = run(lasting("drop-ball"), Made(title="planted", change=with_restitution(lambda e: 0.99 * e)), STEPS)
+    table = results.table
+    [row] = table.index[(table["kind"] == "asymptotic_error") & (table["metric"] == "bounce_height_error")]
+    ends = sorted(factor * table.loc[row, ["lower", "upper"]])
+    table.loc[row, ["value", "lower", "upper", "verdict"]] = [factor * table.loc[row, "value"], *ends, "limited"]
+    found = causes(replace(results, table=table), "planted").parameters
+    assert ("restitution" in [wrong.parameter.name for wrong in found]) == named
+
+
 def test_moments_that_no_body_has_explain_no_error():
     """The largest moment of a thin plate is almost the sum of the other two."""
     plate = load({"duration": 1.0, "body": {"shape": "box", "half_extents": [0.3, 0.001, 0.2], "mass": 1.0}})

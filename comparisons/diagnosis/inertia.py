@@ -35,7 +35,10 @@ def armature(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     """What a joint's armature makes of the least moment, with which a torque turns the body, at any time step [s]."""
     if not body.in_file("armature"):
         return []
-    factor = 1.0 + body.armature / float(body.principal[0].min())
+    # It acts at the origin of the body's frame, on its velocity too, which a torque about the centre of mass changes.
+    c, share = body.offset, body.mass / (body.mass + body.armature)
+    with_it = body.inertia + body.armature * (np.eye(3) + share * (c @ c * np.eye(3) - np.outer(c, c)))
+    factor = float(np.linalg.eigvalsh(with_it)[0] / np.linalg.eigvalsh(body.inertia)[0])
     answer = Answer("inertia", "least moment with armature / without", "1", measured=factor, in_force=factor, physical=1.0)
     return [replace(answer, findings=(Finding("setting", ("armature",)),) * (factor > 1.0 + NOTEWORTHY))]
 

@@ -13,7 +13,7 @@ from dropspin.comparisons.diagnosis.loose_body import LooseBody
 from dropspin.comparisons.diagnosis.mjcf_defaults import option_setting
 from dropspin.comparisons.diagnosis.mujoco_contacts import overrides
 from dropspin.comparisons.diagnosis.mujoco_elements import children_of
-from dropspin.comparisons.diagnosis.mujoco_file import BODY
+from dropspin.comparisons.diagnosis.mujoco_file import ADDED, BODY
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, with_exact_volumes, without, without_mass_of, without_visual
 from dropspin.comparisons.diagnosis.mujoco_shapes import mesh_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText, differ
@@ -55,11 +55,13 @@ def ignored(text: BodyText, in_force: LooseBody, *, raised: bool, condim: int) -
     yield from _visual(text)
     if condim == 1 and "friction" in settings:
         yield "friction", settings["friction"], "not used: condim is 1"
-    frictions = [setting for setting in text.frictions if setting.file] if condim > 1 else []
-    if frictions and max(_friction(setting, 0) for setting in frictions) < in_force.friction:  # which nothing in the file says
-        yield "friction", frictions[0], f"not used for a slide: that of the other geometry, {in_force.friction:g}, is larger"
-    for setting in frictions:
-        if unused := [name for name, (place, least, most) in FURTHER.items() if condim < least and _friction(setting, place) > most]:
+    frictions = {setting: _frictions(setting, text.is_paired) for setting in text.frictions if setting.file} if condim > 1 else {}
+    sliding = max((own[0] for own in frictions.values()), default=math.inf)
+    if sliding < in_force.friction and not text.is_paired and in_force.surface != ADDED:  # which the file has nowhere
+        made = f"not used for a slide: that of the other geometry, {in_force.friction:g}, is larger"
+        yield "friction", next(iter(frictions)), made
+    for setting, own in frictions.items():
+        if unused := [name for name, (place, least, most) in FURTHER.items() if condim < least and own[place] > most]:
             needed = " and ".join(f"{name} friction needs condim {FURTHER[name][1]}" for name in unused)
             is_first = setting == settings.get("friction")
             yield "friction" if is_first else f"friction in line {setting.line}", setting, f"used in part: {needed}, and condim is {condim}"
@@ -84,11 +86,12 @@ def _options(text: BodyText) -> Iterator[Ignored]:
             yield name, setting, "not used: the flag override is not set"
 
 
-def _friction(written: Setting, place: int) -> float:
-    """A coefficient of friction that the file has; 0 if it has none in this place."""
-    numbers = written.text.partition('"')[2].strip('"').split()
-    place += len(numbers) == 5  # the coefficients of a pair, two of them sliding
-    return float(numbers[place]) if len(numbers) > place else 0.0
+def _frictions(written: Setting, of_pair: bool) -> list[float]:
+    """The coefficients of friction that the file has for a slide, torsion and rolling; 0 for those that it has not."""
+    numbers = list(map(float, written.text.partition('"')[2].strip('"').split()))
+    if of_pair or len(numbers) == 5:  # as in an option for all contacts: two slide
+        del numbers[1:2]
+    return (numbers + 3 * [0.0])[:3]
 
 
 def _meshes(text: BodyText) -> Iterator[Ignored]:

@@ -39,7 +39,7 @@ class BodyText:
 
     def __init__(self, alone: MuJoCoAlone, touching: Mapping[int, Mapping[str, Any]]) -> None:
         self.file, self.model, self.head, self.group = alone.file, alone.file.model, alone.head, alone.group
-        self._surface, self._touching = alone.surface, touching
+        self._surface, self._touching, self._is_free = alone.surface, touching, alone.dof is not None
         self._contacts = {**touching, **{geom: alone.in_force_of(geom) for geom in alone.pairs if geom not in touching}}
 
     @cached_property
@@ -126,8 +126,8 @@ class BodyText:
 
     @cached_property
     def _joint(self) -> list[Element]:
-        """The joint of the body."""
-        return [] if self.element is None else children_of(self.element, "joint", "freejoint")[:1]
+        """The free joint of the body; none of a link that is cut loose."""
+        return [] if self.element is None or not self._is_free else children_of(self.element, "joint", "freejoint")[:1]
 
     @property
     def _in_contact(self) -> list[int]:
@@ -160,6 +160,11 @@ class BodyText:
         geoms = [geom_element(self.file, geom) for geom in self._in_contact if self.model.geom_priority[geom] == most]
         found = [mjcf_setting(element, "friction") for element in pairs or geoms if element]
         return list(dict.fromkeys(filter(None, found)))
+
+    @property
+    def is_paired(self) -> bool:
+        """Whether the contacts have settings of pairs."""
+        return any(map(self._pair, self._touching))
 
     def _pair(self, geom: int) -> Element | None:
         """The pair of the file that sets the contact of a geometry."""
@@ -218,8 +223,8 @@ class BodyText:
             changes = {**changes, "friction": " ".join(np.array(str(changes["friction"]).split())[OF_GEOM])}
         for number in alone:
             contact = self._contacts[number]
-            kept = {"friction": contact["friction"][OF_GEOM], "condim": np.array([contact["condim"]])}
-            kept = {name: value for name, value in kept.items() if name not in changes}
+            kept = {**contact, "friction": contact["friction"][OF_GEOM], "condim": np.array([contact["condim"]])}
+            kept = {name: kept[name] for name in ("friction", "condim", "solref", "solimp") if name not in changes}
             kept = {name: value for name, value in kept.items() if np.any(value != getattr(self.model, f"geom_{name}")[number])}
             texts = {name: " ".join(f"{one:g}" for one in value) for name, value in kept.items()}
             priority = 1 + self.model.geom_priority[[number, self._surface]].max()
@@ -228,9 +233,11 @@ class BodyText:
 
     @property
     def can_pair(self) -> bool:
-        """Whether the file can have a contact pair of the body with what it lands on, and no option overrides its settings."""
-        has_both = self._surface is not None and geom_element(self.file, self._surface) is not None
-        return has_both and not self.file.is_urdf and not overrides(self.model)
+        """Whether the file can have contact pairs of the body with what it lands on, none of it copies, and no option overrides them."""
+        if self._surface is None or self.file.is_urdf or overrides(self.model):
+            return False
+        elements = [geom_element(self.file, geom) for geom in (self._surface, *self._contacts)]
+        return all(element is not None and not element.within for element in elements)
 
     def _paired(self, number: int, changes: Mapping[str, object]) -> Iterator[Setting | str]:
         """A contact pair of a geometry and the surface with other settings, and names for those of them that have none."""
@@ -240,7 +247,9 @@ class BodyText:
         for geom, name in zip(geoms, names, strict=True):
             if not mujoco.mj_id2name(self.model, GEOM, geom):
                 yield self._geom_changed(geom, {"name": name})
-        kept = {name: contact[name] for name in ("friction", "condim", "margin", "gap") if np.any(contact[name])}
+        has_class = any(one.tag == "default" for pair in self.file.source.every("pair") for one in pair.around)
+        apart = [name for name in ("margin", "gap") if has_class or contact[name]]
+        kept = {name: contact[name] for name in ("friction", "condim", *apart)}
         texts = {name: " ".join(f"{one:g}" for one in np.atleast_1d(value)) for name, value in kept.items()}
         pair = tagged("pair", {"geom1": names[0], "geom2": names[1], **texts, **changes})
         yield printable(f"<contact>{pair}/></contact>")

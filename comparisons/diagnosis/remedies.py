@@ -23,6 +23,8 @@ SHORTEST = 0.01
 """The shortest time step that is tried, relative to that of the file: nobody would run a hundred times as many steps."""
 OF_RESTITUTION = (1.0, 1.0 / 8.0, 1.0 / 32.0)
 """Time steps at which settings for a restitution are tried, relative to that of the file."""
+KEPT = 32
+"""Results of trying whether a restitution stays, which several questions ask for."""
 Question = Callable[[LooseBody, Sequence[float]], list[Answer]]
 """A function of a body and of time steps, of which the first is judged."""
 
@@ -85,9 +87,11 @@ class Targets(NamedTuple):
             nearest = error
         return {}
 
-    def kept(self, body: LooseBody, other: LooseBody, dt: float) -> bool:
-        """Whether a body with other settings, at a time step [s], rebounds as is wanted where the body does."""
-        return self.restitution is None or all(self.meets(_rebound(other, dt, speed)) for speed in _met_speeds(self, body))
+
+@lru_cache(KEPT)
+def _is_kept(targets: Targets, body: LooseBody, other: LooseBody, dt: float) -> bool:
+    """Whether a body with other settings, at a time step [s], rebounds as is wanted where the body does."""
+    return targets.restitution is None or all(targets.meets(_rebound(other, dt, speed)) for speed in _met_speeds(targets, body))
 
 
 @lru_cache(1)
@@ -143,10 +147,9 @@ def answers_to(question: Question, body: LooseBody, targets: Targets = NO_TARGET
         explained = [_explained(body, finding, effect) for finding in answer.findings]
 
         def suitable(settings: tuple[str, ...], step: float, n: int = number, before: Answer = answer) -> list[Answer]:
-            others = [other for other in again(settings, step)[n : n + 1] if targets.meets(other) or not targets.meets(before)]
-            return others if others and targets.kept(body, body.tried(settings, step), step) else []
+            return [other for other in again(settings, step)[n : n + 1] if targets.meets(other) or not targets.meets(before)]
 
-        findings = [_remedied(body, answer, finding, suitable) for finding in explained]
+        findings = [_remedied(body, answer, finding, suitable, targets) for finding in explained]
         yield replace(answer, findings=tuple(findings))
 
 
@@ -160,7 +163,9 @@ def _explained(body: LooseBody, finding: Finding, effect: Callable[[frozenset[st
     return finding._replace(settings=settings, shares=tuple((", ".join(names), share) for names, share in explaining.items()))
 
 
-def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable[[tuple[str, ...], float], list[Answer]]) -> Finding:
+def _remedied(
+    body: LooseBody, answer: Answer, finding: Finding, again: Callable[[tuple[str, ...], float], list[Answer]], targets: Targets
+) -> Finding:
     """A finding with the changes that remove it, each with the value measured; the finding is then of what the first one changes."""
     found: dict[tuple[str, ...], Remedy] = {}
     changed: set[str] = set()
@@ -180,7 +185,7 @@ def _remedied(body: LooseBody, answer: Answer, finding: Finding, again: Callable
             remains = is_wrong or any(one.is_error == finding.is_error or body.unknown for one in other.findings)
             if answer.quantity == DECAY_TIME and math.isnan(answer.measured):  # of a spin that did not decay
                 remains = math.isinf(other.measured)
-            if (may_stay or not stays) and not remains:
+            if (may_stay or not stays) and not remains and _is_kept(targets, body, body.tried(settings, step), step):
                 found[settings] = Remedy(body.patch(changes, step), other.measured, other.unit, *body.elsewhere(step, changes))
                 changed = changed or {*changes, *["timestep"] * (step != body.dt)}
     if not found and finding.is_error:

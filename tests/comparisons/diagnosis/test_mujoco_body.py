@@ -67,6 +67,21 @@ def test_armature_is_compared_with_the_moment_of_a_ball(tmp_path, added, kinds):
     assert [remedy.value for one in found for remedy in one.remedies] == [1.0] * len(kinds)
 
 
+def test_armature_beside_a_displaced_centre_of_mass_is_that_of_the_mass_matrix(tmp_path):
+    """A torque without a force, which leaves the velocity free: the block of the rotation less what the coupling takes."""
+    import mujoco
+
+    box = '<geom type="box" size=".1 .05 .03" pos=".1 .02 0" mass="1"/>'
+    body = body_of(tmp_path, f'<body name="b"><joint type="free" armature=".5"/>{box}</body>')
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "model.xml"))
+    data, whole = mujoco.MjData(model), np.zeros((6, 6))
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, whole)
+    turning = whole[3:, 3:] - whole[3:, :3] @ np.linalg.solve(whole[:3, :3], whole[:3, 3:])
+    [answer] = armature(body, [body.dt])
+    assert answer.measured == pytest.approx(np.linalg.eigvalsh(turning)[0] / np.linalg.eigvalsh(body.inertia)[0], rel=1e-9)
+
+
 @pytest.mark.extended
 def test_gain_of_energy_is_a_time_step_error_that_rk4_removes(tmp_path):
     world = FREE.format('<geom type="box" size=".008 .044 .089" mass=".09"/>')

@@ -303,6 +303,31 @@ def test_missed_friction_has_a_remedy_of_its_own_and_one_together_with_the_resti
     assert text.startswith('<contact><pair geom1="floor" geom2="g" friction="0.4 0.4 0.01 0.001 0.001" condim="3" solref=')
 
 
+def test_friction_for_a_target_keeps_the_contact_of_the_surface(tmp_path):
+    """A larger priority takes all settings of the geometry, not the coefficient alone: the ball would no longer bounce."""
+    damper = 'solref="0 -1500" solimp=".9999 .9999 .001 .5 2" priority="1"'
+    world = f'<geom name="f" type="plane" size="1 1 .1" {damper}/>' + BALL.format("")
+    body = body_of(tmp_path, world, 'timestep=".001"', on="f")
+    assert body.patch(body.for_contact(None, 0.4, body.dt), body.dt).endswith(
+        'friction="0.4 0.005 0.0001" priority="2" solref="0 -1500" solimp="0.9999 0.9999 0.001 0.5 2"/> (model.xml, line 1)'
+    )
+
+
+@pytest.mark.parametrize(("of_class", "written"), [("", ""), ('margin=".02"', ' margin="0" gap="0"')])
+def test_pair_has_all_that_a_class_could_change(tmp_path, of_class, written):
+    head = f"<default><pair {of_class}/></default>" if of_class else ""
+    body = body_of(tmp_path, BALL.format('name="g" friction="0 0 0" priority="1"'), head=head)
+    text = body.patch(body.for_contact(0.5, None, body.dt), body.dt)
+    assert text.startswith(f'<contact><pair geom1="floor" geom2="g" friction="0 0 0 0 0" condim="3"{written} solref=')
+
+
+def test_copies_of_a_body_have_no_pair_of_their_own(tmp_path):
+    world = f'<replicate count="2" offset="1 0 0">{BALL.format("")}</replicate>'
+    body = body_of(tmp_path, world)
+    text = body.patch(body.for_contact(0.5, None, body.dt), body.dt)
+    assert text.startswith('<geom size=".05" mass="1" solref="0 -750"')
+
+
 def test_geometry_without_a_name_gets_one_for_its_pair(tmp_path):
     body = body_of(tmp_path, BALL.format(""))
     named = '<geom size=".05" mass="1" name="geometry 1 of b"/> (model.xml, line 1)'

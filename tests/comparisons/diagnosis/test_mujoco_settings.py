@@ -425,6 +425,14 @@ def test_sliding_friction_below_the_default_of_the_floor_is_not_used(tmp_path, o
     assert found == [(own, "not used for a slide: that of the other geometry, 1, is larger")] * is_unused
 
 
+def test_friction_of_a_pair_with_two_and_of_a_file_without_a_floor_is_used(tmp_path):
+    pair = '<contact><pair geom1="floor" geom2="g" friction=".5 .8"/></contact>'
+    assert body_of(tmp_path, FREE.format('<geom name="g" size=".1" mass="1"/>'), head=pair).ignored == []
+    box = BOX.replace("/>", ' friction=".3"/>')
+    (tmp_path / "bare.xml").write_text(f"<mujoco><worldbody>{FREE.format(box)}</worldbody></mujoco>")
+    assert MuJoCoModel(tmp_path / "bare.xml", "bare.xml").body("b", None).ignored == []
+
+
 def test_friction_of_a_floor_that_the_dimension_of_a_contact_leaves_out_is_named(tmp_path):
     """The larger coefficients count: of the floor those of turning and rolling, of which four dimensions have the first alone."""
     floor, ball = 'friction="1 .5 .1"', '<geom size=".1" mass="1" condim="{}" friction="1 .02 .0001"/>'

@@ -96,9 +96,9 @@ class Case:
     steps: int = 0
     time_per_step: float = math.nan
 
-    def remark(self, verdict: Verdict, reason: str) -> Measurement:
+    def remark(self, verdict: Verdict, reason: str, basis: Basis = "") -> Measurement:
         """A row without a value."""
-        return Measurement(**vars(self), verdict=verdict, reason=reason)
+        return Measurement(**vars(self), verdict=verdict, reason=reason, basis=basis)
 
     def measurement(self, kind: Kind, metric: str, unit: str, judgement: Judgement, truth: str = "") -> Measurement:
         """A row with a judged value."""

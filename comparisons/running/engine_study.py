@@ -34,7 +34,7 @@ from dropspin.comparisons.running.ablation import explaining, written_out
 from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, divergence
 from dropspin.comparisons.running.engine_entries import engine_entry
-from dropspin.comparisons.running.engine_run import EngineRun, run_engine
+from dropspin.comparisons.running.engine_run import NOT_REPEATED, EngineRun, run_engine
 from dropspin.comparisons.running.perturbed_starts import IN_BATCHES, Changes, changes_of_metrics, number_of_simulations
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress
@@ -107,12 +107,13 @@ class EngineStudy:
         run = EngineRun(Claim(entry.label))
         if not timing.ended:
             starts = [phase.scene for phase in phases]
+            is_first = perturbs and not self.outcomes  # at the coarsest time step, where it costs the least
             perturbed = number_of_simulations(self.own, entry.adapter.precision, size) if perturbs else 0
 
             def on_simulations(done: int, total: int) -> None:
                 self.on_progress(progress._replace(done=done, total=total and total + perturbed))
 
-            answer = self.processes.call(entry, run_engine, scene, dt, starts, self.own.quick, on_simulations=on_simulations)
+            answer = self.processes.call(entry, run_engine, scene, dt, starts, self.own.quick, is_first, on_simulations=on_simulations)
             run = EngineRun(Claim(entry.label), answer) if isinstance(answer, Breakdown) else answer
         motions = [] if run.motion is None else [run.motion, *run.phases]
         run.breakdown = run.breakdown or timing.breakdown or next(filter(None, map(divergence, motions)), None)
@@ -144,7 +145,8 @@ class EngineStudy:
             if run.breakdown is not None:
                 yield timed.remark(run.breakdown.verdict, run.breakdown.reason)
                 continue
-            yield from (timed.remark("limited", limitation.message) for limitation in run.claim.limitations if not limitation.is_minor)
+            for limitation in (one for one in run.claim.limitations if not one.is_minor):
+                yield timed.remark("limited", limitation.message, "not_repeated" if limitation == NOT_REPEATED else "")
             for name, point in points.items():
                 metric = METRICS[name]
                 judgement = judge(scene, truth, run.claim, metric, point, causes.get(name))

@@ -53,7 +53,7 @@ def ignored(text: BodyText, in_force: LooseBody, *, raised: bool, condim: int) -
             yield _changed(text, "inertia", f"{made}: moments {digits(has.tolist())} kg m²")
     yield from _meshes(text)
     yield from _visual(text)
-    if condim == 1 and "friction" in settings:
+    if condim == 1 and "friction" in settings and settings["friction"].file:
         yield "friction", settings["friction"], "not used: condim is 1"
     frictions = {setting: _frictions(setting, text.is_paired) for setting in text.frictions if setting.file} if condim > 1 else {}
     sliding = max((own[0] for own in frictions.values()), default=math.inf)

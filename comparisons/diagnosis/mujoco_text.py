@@ -224,7 +224,8 @@ class BodyText:
         for number in alone:
             contact = self._contacts[number]
             kept = {**contact, "friction": contact["friction"][OF_GEOM], "condim": np.array([contact["condim"]])}
-            kept = {name: kept[name] for name in ("friction", "condim", "solref", "solimp") if name not in changes}
+            changed = {*changes, *overrides(self.model)}
+            kept = {name: kept[name] for name in ("friction", "condim", "solref", "solimp") if name not in changed}
             kept = {name: value for name, value in kept.items() if np.any(value != getattr(self.model, f"geom_{name}")[number])}
             texts = {name: " ".join(f"{one:g}" for one in value) for name, value in kept.items()}
             priority = 1 + self.model.geom_priority[[number, self._surface]].max()

@@ -271,9 +271,9 @@ def test_one_change_is_given_for_a_restitution_at_all_speeds(tmp_path, wanted, s
 
 
 def test_pair_for_a_restitution_grips_as_a_contact_of_this_friction_does(tmp_path):
-    """A sphere that sticks keeps 5/7 of its speed along the floor; the same settings in its geometry leave 0.98 of it.
+    """A sphere that sticks keeps 5/7 of its speed along the floor; the same settings in its geometry leave 0.56 of it.
 
-    MuJoCo uses those of a normal force for friction, too, where it has no `solreffriction`.
+    Without `solreffriction` MuJoCo uses those of a normal force for friction, too: the restitution reverses the slip.
     """
     import mujoco
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.geometries import VOLUMES
 from dropspin.comparisons.diagnosis.loose_body import Changes
-from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of, overrides, plain
+from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of, overrides, plain, with_friction
 from dropspin.comparisons.diagnosis.mujoco_file import BOX, GEOM, PLANE, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_options import ELLIPTIC, set_options
 from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, kind_of, mesh_of, quaternion, shape_of
@@ -198,6 +198,8 @@ class MuJoCoAlone:
         """
         pair = self.pairs[geom]
         changed = {name: np.array(str(self._changes[name]).split(), float) for name in OF_CONTACT if name in self._changes}
+        if "friction" in changed:  # for a slide
+            changed |= with_friction(pair, self._changes["friction"])
         dimensions = {"condim": self._changes["condim"]} if "condim" in self._changes else {}
         still = {"margin": 0.0, "gap": 0.0} if "margin" in self._changes else {}
         return pair | {"solref": self.clamped(pair)} | changed | still | dimensions

@@ -15,7 +15,7 @@ from dropspin.comparisons.diagnosis.loose_body import LIGHT, Changes, Drag, Loos
 from dropspin.comparisons.diagnosis.mujoco_alone import MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_changes import ignored
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
-from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of, overrides
+from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of, overrides, with_friction
 from dropspin.comparisons.diagnosis.mujoco_file import ADDED, PLANE, MuJoCoFile
 from dropspin.comparisons.diagnosis.mujoco_options import ELLIPTIC, ENUMERATIONS, OF_ALL
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
@@ -137,7 +137,12 @@ class MuJoCoBody(LooseBody):
         texts = {self._named(name): spelled(value) for name, value in changes.items()}
         options = {name: text for name, text in texts.items() if name in OF_ALL}
         options |= {"timestep": f"{dt:g}"} if dt != self.dt else {}
-        return self._text.patch(options, {name: text for name, text in texts.items() if name not in options})
+        others = {name: text for name, text in texts.items() if name not in options}
+        if "o_friction" in options:  # of all contacts, also for those without friction
+            of_all = with_friction(overrides(self._file.model) | {"condim": 1}, options["o_friction"])
+            options["o_friction"] = " ".join(f"{value:g}" for value in of_all["friction"])
+            others |= {"condim": "3"} if any(contact["condim"] == 1 for contact in self._touching.values()) else {}
+        return self._text.patch(options, others)
 
     def _named(self, name: str) -> str:
         """The name of what has to be changed for a setting: an option, if it overrides the settings of all contacts."""
@@ -145,11 +150,7 @@ class MuJoCoBody(LooseBody):
 
     def for_contact(self, restitution: float | None, friction: float | None, dt: float) -> Changes:
         changes = {} if restitution is None else self._for_restitution(restitution, dt)
-        if friction is None:
-            return changes
-        touching = next(iter(self._touching.values()))
-        numbers = " ".join(f"{value:g}" for value in (friction, friction, *touching["friction"][2:]))
-        return {**changes, "friction": numbers} | ({"condim": 3} if touching["condim"] == 1 else {})
+        return changes if friction is None else {**changes, "friction": friction}
 
     def _for_restitution(self, restitution: float, dt: float) -> Changes:
         is_rk4 = self._model.opt.integrator == ENUMERATIONS["RK4"]  # all stages of which a damper for one step acts in

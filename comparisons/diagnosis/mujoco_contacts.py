@@ -1,5 +1,6 @@
 """Contacts of two geometries of a compiled model of MuJoCo, with the settings that MuJoCo mixes of both."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -30,6 +31,12 @@ def contact_of(model: Any, first: int, second: int) -> dict[str, Any] | None:
 def friction_of(contact: dict[str, Any]) -> tuple[float, float]:
     """The coefficients of sliding of a contact, in its second and first direction; 0 without friction."""
     return (0.0, 0.0) if contact["condim"] == 1 else (float(contact["friction"][1]), float(contact["friction"][0]))
+
+
+def with_friction(contact: Mapping[str, Any], friction: Any) -> dict[str, Any]:
+    """The friction of a contact with another coefficient for slides, and three dimensions if it has one."""
+    numbers = np.array([friction, friction, *contact["friction"][2:]], float)
+    return {"friction": numbers, "condim": 3} if contact["condim"] == 1 else {"friction": numbers}
 
 
 def overrides(model: Any) -> dict[str, Any]:

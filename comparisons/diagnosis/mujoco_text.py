@@ -11,7 +11,7 @@ from dropspin.comparisons.diagnosis.loose_body import MassProperties
 from dropspin.comparisons.diagnosis.mjcf_defaults import mjcf_setting, option_setting
 from dropspin.comparisons.diagnosis.mujoco_alone import OF_CONTACT, MuJoCoAlone
 from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
-from dropspin.comparisons.diagnosis.mujoco_contacts import effect_of, overrides
+from dropspin.comparisons.diagnosis.mujoco_contacts import effect_of, overrides, with_friction
 from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, pair_element
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, without
@@ -212,25 +212,28 @@ class BodyText:
     def _with_contact(self, changes: Mapping[str, object]) -> list[Setting | str]:
         """The pairs, and geometries without one, with other settings: margins add, of others those of the larger priority count alone."""
         pairs = {number: pair for number in self._contacts if (pair := self._pair(number)) is not None}
-        found: list[Setting | str] = [pair.changed(changes) for pair in pairs.values()]
+        found: list[Setting | str] = [pair.changed(self._of_contact(number, changes)) for number, pair in pairs.items()]
         alone = [number for number in self._contacts if number not in pairs]
         if "margin" in changes:
             wide = [geom for geom in (*alone, self._surface) if alone and geom is not None and self.model.geom_margin[geom]]
             return found + [self._geom_changed(geom, {"margin": 0}) for geom in wide]
         if "solreffriction" in changes:
             return [*found, *(one for number in alone for one in self._paired(number, changes))]
-        if "friction" in changes:
-            changes = {**changes, "friction": " ".join(np.array(str(changes["friction"]).split())[OF_GEOM])}
         for number in alone:
-            contact = self._contacts[number]
+            contact, own = self._contacts[number], self._of_contact(number, changes)
+            if "friction" in own:
+                own["friction"] = " ".join(np.array(str(own["friction"]).split())[OF_GEOM])
             kept = {**contact, "friction": contact["friction"][OF_GEOM], "condim": np.array([contact["condim"]])}
-            changed = {*changes, *overrides(self.model)}
+            changed = {*own, *overrides(self.model)}
             kept = {name: kept[name] for name in ("friction", "condim", "solref", "solimp") if name not in changed}
             kept = {name: value for name, value in kept.items() if np.any(value != getattr(self.model, f"geom_{name}")[number])}
-            texts = {name: " ".join(f"{one:g}" for one in value) for name, value in kept.items()}
             priority = 1 + self.model.geom_priority[[number, self._surface]].max()
-            found.append(self._geom_changed(number, {**changes, "priority": priority, **texts}))
+            found.append(self._geom_changed(number, {**own, "priority": priority, **_texts(kept)}))
         return found
+
+    def _of_contact(self, number: int, changes: Mapping[str, object]) -> dict[str, object]:
+        """Changes for the contact of a geometry: a coefficient for slides with the others that it has."""
+        return {**changes, **_texts(with_friction(self._contacts[number], changes["friction"]))} if "friction" in changes else {**changes}
 
     @property
     def can_pair(self) -> bool:
@@ -251,8 +254,7 @@ class BodyText:
         has_class = any(one.tag == "default" for pair in self.file.source.every("pair") for one in pair.around)
         apart = [name for name in ("margin", "gap") if has_class or contact[name]]
         kept = {name: contact[name] for name in ("friction", "condim", *apart)}
-        texts = {name: " ".join(f"{one:g}" for one in np.atleast_1d(value)) for name, value in kept.items()}
-        pair = tagged("pair", {"geom1": names[0], "geom2": names[1], **texts, **changes})
+        pair = tagged("pair", {"geom1": names[0], "geom2": names[1], **_texts(kept), **self._of_contact(number, changes)})
         yield printable(f"<contact>{pair}/></contact>")
 
     def _geom_changed(self, number: int, changes: Mapping[str, object]) -> Setting | str:
@@ -267,6 +269,11 @@ class BodyText:
         body = int(self.model.geom_bodyid[number])
         name = mujoco.mj_id2name(self.model, GEOM, number) or f"geometry {number - self.model.body_geomadr[body] + 1}"
         return f"{name} of {mujoco.mj_id2name(self.model, BODY, body) or f'body {body}'}"
+
+
+def _texts(values: Mapping[str, Any]) -> dict[str, str]:
+    """Numbers, and several of them, as attributes have them."""
+    return {name: " ".join(f"{one:g}" for one in np.atleast_1d(value)) for name, value in values.items()}
 
 
 def differ(wanted: Any, has: Any) -> bool:

@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 
 from dropspin.comparisons.faults.fault_model import FaultModel, Reported, changed_part, changed_start
 from dropspin.scenarios import DropspinError, Scenario
-from dropspin.scenarios.bodies import Body, Capsule, Cylinder, Ellipsoid, Mesh, OnAxis, Shape
+from dropspin.scenarios.bodies import Body, Box, Capsule, Cylinder, Ellipsoid, Mesh, OnAxis, Shape
 from dropspin.scenarios.bodies.inertia import in_numbers
 from dropspin.scenarios.rotations import about, conjugate, multiply
 from dropspin.scenarios.state import ORIENTATION, Array
@@ -43,7 +43,22 @@ def _about_origin(body: Mesh) -> Mapping[str, Any]:
     return {"shape": "mesh", "points": body.points, "faces": body.faces, "center_of_mass": [0.0, 0.0, 0.0]}
 
 
+def _about(share: float) -> Instead:
+    """A box whose centre of mass is displaced by another share of the distance from its centre."""
+
+    def instead(body: Box) -> Mapping[str, Any]:
+        if not body.centre.any():
+            raise DropspinError("the centre of mass of a box is at its centre")
+        return {"shape": "box", "half_extents": body.half_extents, "center_of_mass": (share * body.centre).tolist()}
+
+    return instead
+
+
 WRONG: dict[type[Any], dict[str, Instead]] = {
+    Box: {
+        "the shape appears to be built about the centre of mass; it is about -centre": _about(0.0),
+        "the shape appears to be built about +centre; it is about -centre": _about(-1.0),
+    },
     Cylinder: {
         "a cylinder appears to be built as a box": lambda body: {
             "shape": "box",

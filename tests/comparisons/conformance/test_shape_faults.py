@@ -15,7 +15,7 @@ MOMENTS = "the moments of inertia appear to be permuted to ({})"
 
 
 def checked(adapter, shape):
-    return run_check(EngineEntry(adapter.label, adapter), f"striking {shape}")
+    return run_check(EngineEntry(adapter.label, adapter), shape if shape == "displaced corner" else f"striking {shape}")
 
 
 @pytest.mark.sample(1)
@@ -56,6 +56,12 @@ def checked(adapter, shape):
             lambda body: {"pos": body.centre},
             "a mesh appears to be about the origin of its file; a state has the centre of mass",
         ),
+        (
+            "displaced corner",
+            lambda body: {"pos": 0.0 * body.centre},
+            "the shape appears to be built about the centre of mass; it is about -centre",
+        ),
+        ("displaced corner", lambda body: {"pos": body.centre}, "the shape appears to be built about +centre; it is about -centre"),
     ],
 )
 def test_wrong_shape_is_named(monkeypatch, shape, built, message):

@@ -34,7 +34,7 @@ def test_body_without_a_result_fails_with_the_reason(failure):
 
 def test_unknown_words_are_refused(failure):
     assert failure(0, [], allowed=["slide", "tumbl"]).startswith("allowed: got tumbl; rows begin with inertia, fall, spin, tumble,")
-    assert {question.__name__ for question in QUESTIONS} - set(pytest_plugin.QUESTIONS) == {"creep", "worst_tumble"}
+    assert {question.__name__ for question in QUESTIONS} - set(pytest_plugin.QUESTIONS) == {"armature", "creep", "worst_tumble"}
 
 
 def test_findings_that_are_not_allowed_fail(failure):

@@ -1,6 +1,6 @@
 """The output of `dropspin limits`: the largest time steps, and for each engine the range of tested values in which it does not fail."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from itertools import groupby
 from typing import Literal
 
@@ -138,12 +138,15 @@ def _compared_in_part(study: LimitsStudy) -> list[str]:
         points = [point for scan in study.scans if scan.axis.label == label for point in scan.points]
         ends = {point.value: until for point in points if (until := point.diagnosis.compared_until) is not None}
         if ends:
-            where = (
-                f"{counted(len(ends), 'value', 'values')}, {' to '.join(dict.fromkeys(f'{one:.4g}' for one in (min(ends), max(ends))))},"
-            )
-            times = " to ".join(dict.fromkeys(map(duration, (min(ends.values()), max(ends.values())))))
-            found.append(f"Axis {label}: at {where} the exact solution ends before the motion, after {times}; later errors are not judged.")
+            where = f"{counted(len(ends), 'value', 'values')}, {_span(ends, '{:.4g}'.format)},"
+            ending = f"the exact solution ends before the motion, after {_span(ends.values(), duration)}; later errors are not judged"
+            found.append(f"Axis {label}: at {where} {ending}.")
     return found
+
+
+def _span(values: Collection[float], written: Callable[[float], str]) -> str:
+    """The least and the largest of some values, or the one that they are written as."""
+    return " to ".join(dict.fromkeys(map(written, (min(values), max(values)))))
 
 
 def _refinement(engine: str, points: Sequence[ScanPoint]) -> str:

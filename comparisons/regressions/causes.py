@@ -1,7 +1,7 @@
 """The search for a single cause with which the asymptotic errors of an engine are consistent: a wrong parameter, or a known fault.
 
 The errors that a cause has are the differences between the exact solutions of the scene with and without it. A cause must have the errors
-of the scenes in which asymptotic errors fail, none in the scenes in which they pass, and at most that of which a known limitation may be a
+of the scenes in which asymptotic errors fail, none in the scenes in which they pass, and about those of which a known limitation may be a
 cause as well. Where an exact solution with the cause is not known to the end, or leaves a metric undefined, none of this holds; scenes in
 which it is so for all errors that fail are named.
 """
@@ -66,17 +66,18 @@ class Causes(NamedTuple):
 
 
 def causes(results: Results, engine: str) -> Causes:
-    """The causes each of which alone explains asymptotic errors of an engine and is excluded by none; none if it does not repeat a motion.
+    """The causes each of which alone explains asymptotic errors of an engine and is excluded by none.
 
-    Those beside a recording may have other causes than an engine's.
+    Those beside a recording may have other causes than an engine's; those of a scene whose motion it does not repeat are random in part.
     Each error must lie within its 95 % interval, widened by the error of sampling the exact solutions at the run's finest time step.
     """
     table = results.table
     mine = table[(table["engine"] == engine) & (table["kind"] == "asymptotic_error") & ~table["metric"].isin(JUMPING)]
-    mine = mine[~mine["scene"].isin(results.recorded)]
+    random = table.loc[(table["engine"] == engine) & (table["basis"] == "not_repeated"), "scene"]
+    mine = mine[~mine["scene"].isin([*results.recorded, *random])]
     judged = mine[mine["verdict"].isin(["failed", "passed", "limited"]) & (mine["cause"] != "unresolved") & mine["lower"].notna()]
     failed = judged[judged["verdict"] == "failed"]
-    if failed.empty or ((table["engine"] == engine) & (table["basis"] == "not_repeated")).any():
+    if failed.empty:
         return Causes([], [], {})
     dt = min(map(float, results.provenance["asked"]["dts"]))
     scenes = [(results.scenes[str(name)], rows.to_dict("records")) for name, rows in judged.groupby("scene")]
@@ -153,8 +154,8 @@ def _explained(scene: Scenario, fault: FaultModel, rows: list[dict[Hashable, Any
         if row["cause"] != "rounding":  # whose interval has all that rounding may hide
             sampling += negligible(scene, row["unit"])
         lower, upper = row["lower"] - sampling, row["upper"] + sampling
-        if row["verdict"] == "limited":
-            lower, upper = min(lower, 0.0), max(upper, 0.0)
+        if row["verdict"] == "limited":  # the limitation explains an error of at least this size, of either sign
+            lower, upper = lower - abs(row["value"]), upper + abs(row["value"])
         if not fine.is_whole:  # the largest error so far is a lower bound of the whole one
             lower, caused = (-np.inf, -np.inf if METRICS[metric].signed else caused)
         has_none = row["verdict"] == "failed" and abs(caused) <= sampling  # as it has of an error whose interval begins at 0

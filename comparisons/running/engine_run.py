@@ -8,8 +8,10 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.judging.convergence import Claim
+from dropspin.comparisons.measuring.differences import differences
 from dropspin.comparisons.measuring.metric import PHASES_OF_TOSS
 from dropspin.comparisons.measuring.metrics import metrics_for
+from dropspin.comparisons.measuring.tolerances import MATTERS
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, EnsembleOutcome
 from dropspin.comparisons.running.adapter_output import verified_claims, verified_predictions
 from dropspin.comparisons.running.arguments import EngineEntry
@@ -19,6 +21,7 @@ from dropspin.comparisons.running.ensembles import run_ensemble
 from dropspin.comparisons.running.progress import OnSimulations
 from dropspin.comparisons.running.uncertainty import simulations_of, uncertainties
 from dropspin.scenarios import Scenario, Trajectory, truth_for
+from dropspin.scenarios.state import Array
 
 NOT_REPEATED = KnownLimitation("the engine does not repeat its own motion; dropspin conform --check repeats says where it differs")
 """It widens no tolerance, and excuses no error."""
@@ -52,13 +55,7 @@ class EngineRun:
 
 
 def run_engine(
-    entry: EngineEntry,
-    scene: Scenario,
-    dt: float,
-    starts: Sequence[Scenario],
-    quick: bool,
-    repeats: bool = False,
-    on_simulations: OnSimulations = share_progress,
+    entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario], quick: bool, on_simulations: OnSimulations = share_progress
 ) -> EngineRun:
     """Run a scene from its own start, then from each of its start phases if there are several; failures are part of the result.
 
@@ -68,7 +65,6 @@ def run_engine(
         dt: Time step [s].
         starts: The scene from each of its start phases.
         quick: Whether few members of an ensemble are run.
-        repeats: Whether the scene is run from its own start again at the end, to see whether the motion is the same.
         on_simulations: Called after each simulation.
     """
     engine, found = entry.adapter, EngineRun(Claim(entry.label))
@@ -85,8 +81,6 @@ def run_engine(
         found.claim = Claim(entry.label, order, precision, own.limitations)
         recorded = record_batch(engine, others, dt, lambda done, _: on_simulations(1 + done, total)) if others else [own]
         found.phases = [recording.motion for recording in recorded]
-        if repeats and not np.array_equal(record(engine, scene, dt).motion.states, own.motion.states, equal_nan=True):
-            found.claim = found.claim._replace(limitations=(*own.limitations, NOT_REPEATED))
         found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt, QUICK_MEMBERS if quick else None)
         if drawn:
             found.uncertainties = uncertainties(engine, scene, dt, size, lambda done: on_simulations(total - drawn + done, total))
@@ -98,6 +92,19 @@ def run_engine(
     except Exception as error:  # whatever an engine raises costs its own row only
         found.breakdown = classify(error)
     return found
+
+
+def is_repeated(entry: EngineEntry, scene: Scenario, dt: float, states: Array) -> bool:
+    """Whether an engine that runs a scene again, twice, moves as before, up to differences that do not matter, such as those of threads.
+
+    Args:
+        entry: The engine.
+        scene: The scene.
+        dt: Time step [s].
+        states: Those of its motion, shape (n, 13).
+    """
+    again = [record(entry.adapter, scene, dt).motion.states for _ in range(2)]
+    return all((differences(scene, states, one) <= MATTERS).all() for one in again if not np.array_equal(states, one, equal_nan=True))
 
 
 def motions_from(

@@ -34,7 +34,7 @@ from dropspin.comparisons.running.ablation import explaining, written_out
 from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, divergence
 from dropspin.comparisons.running.engine_entries import engine_entry
-from dropspin.comparisons.running.engine_run import NOT_REPEATED, EngineRun, run_engine
+from dropspin.comparisons.running.engine_run import NOT_REPEATED, EngineRun, is_repeated, run_engine
 from dropspin.comparisons.running.perturbed_starts import IN_BATCHES, Changes, changes_of_metrics, number_of_simulations
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress
@@ -107,16 +107,21 @@ class EngineStudy:
         run = EngineRun(Claim(entry.label))
         if not timing.ended:
             starts = [phase.scene for phase in phases]
-            is_first = perturbs and not self.outcomes  # at the coarsest time step, where it costs the least
             perturbed = number_of_simulations(self.own, entry.adapter.precision, size) if perturbs else 0
 
             def on_simulations(done: int, total: int) -> None:
                 self.on_progress(progress._replace(done=done, total=total and total + perturbed))
 
-            answer = self.processes.call(entry, run_engine, scene, dt, starts, self.own.quick, is_first, on_simulations=on_simulations)
+            answer = self.processes.call(entry, run_engine, scene, dt, starts, self.own.quick, on_simulations=on_simulations)
             run = EngineRun(Claim(entry.label), answer) if isinstance(answer, Breakdown) else answer
         motions = [] if run.motion is None else [run.motion, *run.phases]
         run.breakdown = run.breakdown or timing.breakdown or next(filter(None, map(divergence, motions)), None)
+        # At the coarsest time step, where it costs the least.
+        is_first = perturbs and all(outcome.run.breakdown is not None for outcome in self.outcomes)
+        if is_first and run.motion is not None and run.breakdown is None:
+            again = self.processes.call(entry, is_repeated, scene, dt, run.motion.states)
+            if isinstance(again, Breakdown) or not again:
+                run.claim = run.claim._replace(limitations=(*run.claim.limitations, NOT_REPEATED))
         cases, changes = [] if run.breakdown else compare(run.phases, phases), Changes([], {})
         if cases and perturbs:
             before = size + (size > 1)

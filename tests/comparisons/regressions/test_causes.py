@@ -228,9 +228,9 @@ def test_cause_of_one_error_that_is_hardly_known_or_of_one_that_rounding_exclude
     assert ("gravity" in [wrong.parameter.name for wrong in found]) == named
 
 
-@pytest.mark.parametrize(("factor", "named"), [(1.0, True), (3.0, True), (0.5, False), (-1.0, False)])
-def test_cause_of_more_than_an_error_that_a_limitation_may_cause_as_well_is_not_named(factor, named):
-    """A limitation may explain the rest of a larger error, and no part of a smaller one, or of one of the other sign."""
+@pytest.mark.parametrize(("factor", "named"), [(1.0, True), (2.0, True), (0.3, False), (-1.0, False)])
+def test_cause_of_another_error_than_one_that_a_limitation_may_cause_as_well_is_not_named(factor, named):
+    """The limitation may reduce the error that the cause has, or be a part of it, by as much as is seen."""
     results = run(lasting("drop-ball"), Made(title="planted", change=with_restitution(lambda e: 0.99 * e)), STEPS)
     table = results.table
     [row] = table.index[(table["kind"] == "asymptotic_error") & (table["metric"] == "bounce_height_error")]
@@ -317,3 +317,14 @@ def test_engine_that_does_not_repeat_its_motion_has_no_cause_and_a_sentence_on_i
     assert causes(results, "alternating").parameters == []
     [row] = results.table[results.table["basis"] == "not_repeated"].to_dict("records")
     assert (row["scene"], row["dt"], row["verdict"], row["metric"]) == ("drop-ball", STEPS[0], "limited", "")
+
+
+def test_engine_whose_rounding_differs_from_run_to_run_has_a_cause():
+    """As of threads that add in another order."""
+    noise = np.random.default_rng(1)
+    engine = Made(
+        title="threaded",
+        change=with_restitution(lambda e: 0.98 * e),
+        distort=lambda rows, times, dt, truth: rows * (1.0 + 2e-16 * noise.integers(-1, 2, rows.shape)),
+    )
+    assert consistent_with(engine, "drop-ball", "fall-spin") == "Possible cause of the asymptotic errors: restitution 2 % too low."

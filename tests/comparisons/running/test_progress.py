@@ -22,7 +22,7 @@ def test_every_simulation_is_reported():
     total = 1 + START_PHASES
     for engine, done in ((made.Exact(), range(1, 1 + total)), ("wang", (1, total))):
         reported = []
-        run_engine(engine_entry(engine), BALL, DT, STARTS, False, False, lambda *counts, reported=reported: reported.append(counts))
+        run_engine(engine_entry(engine), BALL, DT, STARTS, False, lambda *counts, reported=reported: reported.append(counts))
         assert reported == [(number, total) for number in done]
 
 

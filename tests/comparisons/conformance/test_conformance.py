@@ -62,7 +62,7 @@ def test_documented_adapter_passes_and_is_short():
 
 
 ELLIPSOID = {"striking ellipsoid"}
-STRIKES = {"corner", "spinning corner", "striking capsule", "striking cylinder", "striking mesh", *ELLIPSOID}
+STRIKES = {"corner", "displaced corner", "spinning corner", "striking capsule", "striking cylinder", "striking mesh", *ELLIPSOID}
 
 
 @pytest.mark.extended

@@ -1,9 +1,8 @@
 """The search for a single cause with which the asymptotic errors of an engine are consistent: a wrong parameter, or a known fault.
 
 The errors that a cause has are the differences between the exact solutions of the scene with and without it. A cause must have the errors
-of the scenes in which asymptotic errors fail, none in the scenes in which they pass, and about those of which a known limitation may be a
-cause as well. Where an exact solution with the cause is not known to the end, or leaves a metric undefined, none of this holds; scenes in
-which it is so for all errors that fail are named.
+of the scenes in which asymptotic errors fail, and none in the scenes in which they pass. Where an exact solution with the cause is not
+known to the end, or leaves a metric undefined, neither holds; scenes in which it is so for all errors that fail are named.
 """
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
@@ -75,7 +74,7 @@ def causes(results: Results, engine: str) -> Causes:
     mine = table[(table["engine"] == engine) & (table["kind"] == "asymptotic_error") & ~table["metric"].isin(JUMPING)]
     random = table.loc[(table["engine"] == engine) & (table["basis"] == "not_repeated"), "scene"]
     mine = mine[~mine["scene"].isin([*results.recorded, *random])]
-    judged = mine[mine["verdict"].isin(["failed", "passed", "limited"]) & (mine["cause"] != "unresolved") & mine["lower"].notna()]
+    judged = mine[mine["verdict"].isin(["failed", "passed"]) & (mine["cause"] != "unresolved") & mine["lower"].notna()]
     failed = judged[judged["verdict"] == "failed"]
     if failed.empty:
         return Causes([], [], {})
@@ -153,13 +152,11 @@ def _explained(scene: Scenario, fault: FaultModel, rows: list[dict[Hashable, Any
         sampling = max(abs(caused - half.error(metric)) + abs(half.sampled(metric)) for half in halves)
         if row["cause"] != "rounding":  # whose interval has all that rounding may hide
             sampling += negligible(scene, row["unit"])
-        lower, upper = row["lower"] - sampling, row["upper"] + sampling
-        if row["verdict"] == "limited":  # the limitation explains an error of at least this size, of either sign
-            lower, upper = lower - abs(row["value"]), upper + abs(row["value"])
+        lower = row["lower"] - sampling
         if not fine.is_whole:  # the largest error so far is a lower bound of the whole one
             lower, caused = (-np.inf, -np.inf if METRICS[metric].signed else caused)
         has_none = row["verdict"] == "failed" and abs(caused) <= sampling  # as it has of an error whose interval begins at 0
-        if has_none or not lower <= caused <= upper:
+        if has_none or not lower <= caused <= row["upper"] + sampling:
             return None
         if row["verdict"] == "failed":
             compared += 1

@@ -23,7 +23,7 @@ from dropspin.comparisons.running.uncertainty import simulations_of, uncertainti
 from dropspin.scenarios import Scenario, Trajectory, truth_for
 from dropspin.scenarios.state import Array
 
-NOT_REPEATED = KnownLimitation("the engine does not repeat its own motion; dropspin conform --check repeats says where it differs")
+NOT_REPEATED = KnownLimitation("the engine does not repeat its own motion; dropspin symmetries shows where it differs")
 """It widens no tolerance, and excuses no error."""
 
 

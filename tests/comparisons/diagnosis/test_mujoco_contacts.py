@@ -295,7 +295,8 @@ def test_missed_friction_has_a_remedy_of_its_own_and_one_together_with_the_resti
     answers = [rebound(body, [body.dt], 1.0, REBOUND), Answer("friction", COEFFICIENT, "1", measured=body.friction)]
     alone = [answer for answer in Targets(None, 0.4).judged(body, answers) if answer.quantity == COEFFICIENT]
     frictions = [(one.text, one.value) for one in alone[0].findings[0].remedies]
-    assert frictions == [(body.patch({"friction": 0.4}, body.dt), 0.4)]
+    written = '<geom size=".05" mass="1" name="g" condim="3" priority="2" friction="0.4 0.01 0.001"/> (model.xml, line 1)'
+    assert frictions == [(written, 0.4)]
     both = [one for answer in Targets(0.5, 0.4).judged(body, answers) for finding in answer.findings for one in finding.remedies]
     assert [one.value for one in both] == pytest.approx([0.5, 0.4], abs=0.01)
     [text] = {one.text for one in both}

@@ -228,18 +228,6 @@ def test_cause_of_one_error_that_is_hardly_known_or_of_one_that_rounding_exclude
     assert ("gravity" in [wrong.parameter.name for wrong in found]) == named
 
 
-@pytest.mark.parametrize(("factor", "named"), [(1.0, True), (2.0, True), (0.3, False), (-1.0, False)])
-def test_cause_of_another_error_than_one_that_a_limitation_may_cause_as_well_is_not_named(factor, named):
-    """The limitation may reduce the error that the cause has, or be a part of it, by as much as is seen."""
-    results = run(lasting("drop-ball"), Made(title="planted", change=with_restitution(lambda e: 0.99 * e)), STEPS)
-    table = results.table
-    [row] = table.index[(table["kind"] == "asymptotic_error") & (table["metric"] == "bounce_height_error")]
-    ends = sorted(factor * table.loc[row, ["lower", "upper"]])
-    table.loc[row, ["value", "lower", "upper", "verdict"]] = [factor * table.loc[row, "value"], *ends, "limited"]
-    found = causes(replace(results, table=table), "planted").parameters
-    assert ("restitution" in [wrong.parameter.name for wrong in found]) == named
-
-
 def test_moments_that_no_body_has_explain_no_error():
     """The largest moment of a thin plate is almost the sum of the other two."""
     plate = load({"duration": 1.0, "body": {"shape": "box", "half_extents": [0.3, 0.001, 0.2], "mass": 1.0}})
@@ -312,7 +300,7 @@ def test_engine_that_does_not_repeat_its_motion_has_no_cause_and_a_sentence_on_i
     sentence = next(failure_parts(results, failures(results))).items[0]
     assert sentence == (
         "alternating does not repeat its own motion in drop-ball, so that a part of its errors is random; "
-        "dropspin conform --check repeats says where it differs."
+        "dropspin symmetries shows where it differs."
     )
     assert causes(results, "alternating").parameters == []
     [row] = results.table[results.table["basis"] == "not_repeated"].to_dict("records")

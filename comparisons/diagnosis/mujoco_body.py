@@ -138,10 +138,10 @@ class MuJoCoBody(LooseBody):
         options = {name: text for name, text in texts.items() if name in OF_ALL}
         options |= {"timestep": f"{dt:g}"} if dt != self.dt else {}
         others = {name: text for name, text in texts.items() if name not in options}
-        if "o_friction" in options:  # of all contacts, also for those without friction
-            of_all = with_friction(overrides(self._file.model) | {"condim": 1}, options["o_friction"])
-            options["o_friction"] = " ".join(f"{value:g}" for value in of_all["friction"])
-            others |= {"condim": "3"} if any(contact["condim"] == 1 for contact in self._touching.values()) else {}
+        if "o_friction" in options:  # which all contacts have, those without friction too
+            found = [with_friction(contact, options["o_friction"]) for contact in self._touching.values()]
+            options["o_friction"] = " ".join(f"{value:g}" for value in found[0]["friction"])
+            others |= {"condim": "3"} if any("condim" in one for one in found) else {}
         return self._text.patch(options, others)
 
     def _named(self, name: str) -> str:

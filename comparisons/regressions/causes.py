@@ -72,8 +72,7 @@ def causes(results: Results, engine: str) -> Causes:
     """
     table = results.table
     mine = table[(table["engine"] == engine) & (table["kind"] == "asymptotic_error") & ~table["metric"].isin(JUMPING)]
-    random = table.loc[(table["engine"] == engine) & (table["basis"] == "not_repeated"), "scene"]
-    mine = mine[~mine["scene"].isin([*results.recorded, *random])]
+    mine = mine[~mine["scene"].isin([*results.recorded, *results.not_repeated(engine)])]
     judged = mine[mine["verdict"].isin(["failed", "passed"]) & (mine["cause"] != "unresolved") & mine["lower"].notna()]
     failed = judged[judged["verdict"] == "failed"]
     if failed.empty:

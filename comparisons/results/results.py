@@ -207,6 +207,11 @@ class Results:
         """The scenes that are compared with a recording."""
         return [name for name, scene in self.scenes.items() if scene.recording is not None]
 
+    def not_repeated(self, engine: str) -> list[str]:
+        """The scenes in which an engine does not repeat its own motion."""
+        rows = self.table[(self.table["engine"] == engine) & (self.table["basis"] == "not_repeated")]
+        return list(rows["scene"].unique())
+
     @property
     def measurements(self) -> pd.DataFrame:
         """The rows that compare an engine at a single time step with an exact solution, a recording or a conservation law."""

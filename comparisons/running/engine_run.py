@@ -53,6 +53,10 @@ class EngineRun:
     predicted: dict[str, float] = field(default_factory=dict)
     uncertainties: dict[str, float] = field(default_factory=dict)
 
+    def meet(self, limitation: KnownLimitation) -> None:
+        """Add a limitation that was met to what the engine declares."""
+        self.claim = self.claim._replace(limitations=(*self.claim.limitations, limitation))
+
 
 def run_engine(
     entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario], quick: bool, on_simulations: OnSimulations = share_progress

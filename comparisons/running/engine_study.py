@@ -121,7 +121,7 @@ class EngineStudy:
         if is_first and run.motion is not None and run.breakdown is None:
             again = self.processes.call(entry, is_repeated, scene, dt, run.motion.states)
             if isinstance(again, Breakdown) or not again:
-                run.claim = run.claim._replace(limitations=(*run.claim.limitations, NOT_REPEATED))
+                run.meet(NOT_REPEATED)
         cases, changes = [] if run.breakdown else compare(run.phases, phases), Changes([], {})
         if cases and perturbs:
             before = size + (size > 1)
@@ -135,7 +135,7 @@ class EngineStudy:
                 run.breakdown, cases = breakdown, []
         points = measure(self.own, dt, run, cases, changes.of_starts) if cases else {}
         if any(changes.in_batch.get(name, 0.0) > point.tolerance for name, point in points.items()):
-            run.claim = run.claim._replace(limitations=(*run.claim.limitations, IN_BATCHES))
+            run.meet(IN_BATCHES)
         digest = motion_digest(motions) if motions else ""
         case = Case(scene.name, entry.label, dt, scene.steps(dt))
         return Outcome(case, timing.per_step, replace(run, phases=[]), points, digest), cases

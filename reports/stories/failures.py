@@ -92,9 +92,9 @@ def _failure(results: Results, group: Sequence[Row], baseline: str | None) -> Fa
 
 def _not_repeated(results: Results, engine: str) -> list[str]:
     """A sentence on the scenes in which an engine does not repeat its own motion; none if there are none."""
-    rows = results.table[(results.table["engine"] == engine) & (results.table["basis"] == "not_repeated")]
-    why = f"{engine} does not repeat its own motion in {listed(list(rows['scene'].unique()))}, so that a part of its errors is random"
-    return [f"{why}; dropspin symmetries shows where it differs."] if len(rows) else []
+    scenes = results.not_repeated(engine)
+    why = f"{engine} does not repeat its own motion in {listed(scenes)}, so that a part of its errors is random"
+    return [f"{why}; dropspin symmetries shows where it differs."] if scenes else []
 
 
 def failure_parts(results: Results, failures: Sequence[Failure], baseline: str | None = None) -> Iterator[Part]:

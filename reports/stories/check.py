@@ -13,7 +13,7 @@ from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.document import Document, Paragraph, Sentences, Table
 from dropspin.reports.stories.failures import Failure, failure_parts
-from dropspin.reports.stories.findings import counts, verdict_sentence
+from dropspin.reports.stories.findings import counts, not_repeated, verdict_sentence
 from dropspin.reports.stories.numbers import capitalized, failing
 from dropspin.scenarios.text import counted
 
@@ -37,7 +37,8 @@ def document(checked: Checked, failures: Sequence[Failure], run: str, baseline: 
     versions = ", ".join(f"{name} {version}" for name, version in versions_behind(results.provenance).items())
     machine = Paragraph(f"{versions} on {results.provenance['cpu']}", on_terminal=False)
     scope = " only, without a baseline" if baseline is None else f", and the accepted results in {baseline}"
-    outcome = [Sentences([f"Checked: the expectations of the scenes{scope}.", *notes]), Paragraph(verdict, on_page=False)]
+    checks = f"Checked: the expectations of the scenes{scope}."
+    outcome = [Sentences([checks, *not_repeated(results), *notes]), Paragraph(verdict, on_page=False)]
     return Document(f"dropspin: {'✗' if listed else '✓'} {verdict}", [*listed, tallies, machine], outcome)
 
 

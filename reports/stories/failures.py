@@ -90,13 +90,6 @@ def _failure(results: Results, group: Sequence[Row], baseline: str | None) -> Fa
     )
 
 
-def _not_repeated(results: Results, engine: str) -> list[str]:
-    """A sentence on the scenes in which an engine does not repeat its own motion; none if there are none."""
-    scenes = results.not_repeated(engine)
-    why = f"{engine} does not repeat its own motion in {listed(scenes)}, so that a part of its errors is random"
-    return [f"{why}; dropspin symmetries shows where it differs."] if scenes else []
-
-
 def failure_parts(results: Results, failures: Sequence[Failure], baseline: str | None = None) -> Iterator[Part]:
     """For each engine: what explains its asymptotic errors, a sentence for each cause of failures, and one command that reproduces them.
 
@@ -107,7 +100,7 @@ def failure_parts(results: Results, failures: Sequence[Failure], baseline: str |
     shown = [failure for failure in failures if failure.result or not failure.accepted or (failure.scene, failure.engine) not in broken]
     for engine, of_engine in grouped(shown, attrgetter("engine")).items():
         by_cause = grouped(of_engine, lambda failure: (failure.broke_down, failure.what if failure.broke_down else failure.scene))
-        explained = [*_not_repeated(results, engine), *_consistent_with(results, engine), *settings_that_explain(results, engine)]
+        explained = [*_consistent_with(results, engine), *settings_that_explain(results, engine)]
         sentences = [f"✗ {_of_one_cause(alike)}" for alike in by_cause.values()]
         for most, on_page in ((MOST_ON_PAGE, True), (MOST_ON_TERMINAL, False)):
             more = len(sentences) - most

@@ -133,6 +133,16 @@ def orders(results: Results, scene: str, engine: str) -> str:
     return ", ".join(parts)
 
 
+def not_repeated(results: Results) -> list[str]:
+    """A sentence on each engine that does not repeat its own motion in some scenes."""
+    return [
+        f"{in_sentence(engine)} does not repeat its own motion in {listed(scenes)}, so that a part of its errors is random; "
+        "dropspin symmetries shows where it differs."
+        for engine in results.engines
+        if (scenes := results.not_repeated(engine))
+    ]
+
+
 def verdict_sentence(results: Results, tally: Counts) -> str:
     """The outcome of the checks in one sentence."""
     judged, known = tally.passed + tally.failed, _known(results, tally)

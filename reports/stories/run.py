@@ -18,6 +18,7 @@ from dropspin.reports.stories.findings import (
     ensemble_differences,
     finding_sentences,
     missing_engines,
+    not_repeated,
     profile_comparisons,
     verdict_sentence,
 )
@@ -33,8 +34,8 @@ class Overview(NamedTuple):
 
     Attributes:
         verdict: The outcome of the checks in one sentence.
-        points: What a quick run left out, engines that are missing or have default settings, which engine to use for which quantity,
-            and the command that draws the same random scenes again.
+        points: What a quick run left out, engines that are missing, do not repeat their motions or have default settings, which engine
+            to use for which quantity, and the command that draws the same random scenes again.
         findings: The main finding on each engine.
         statuses: The status of each engine in each scene, by scene and engine.
         leading: The leading error of each scene with an exact solution, by scene.
@@ -63,7 +64,7 @@ class Overview(NamedTuple):
 def overview(results: Results) -> Overview:
     """The overview of a run."""
     profiles = profile_comparisons(results)
-    before = [*_quick(results), *missing_engines(results), *(profile.sentence for profile in profiles)]
+    before = [*_quick(results), *missing_engines(results), *not_repeated(results), *(profile.sentence for profile in profiles)]
     after = [*ensemble_differences(results), *beside_recordings(results), *reproduce_drawn(results)]
     return Overview(
         verdict=verdict_sentence(results, counts(results)),

@@ -165,10 +165,17 @@ class Configured:
 
     def without(self, names: Collection[str]) -> Self:
         """The same engine without some of its options, and without settings that then have no effect."""
-        left = {name: text for name, text in self.options.items() if name not in names}
-        needs = {name: self.settings[name].needs for name in left if name in self.settings}
-        acting = {name for name in needs if all(left.get(option, self._default(option)) in values for option, *values in needs[name])}
-        return replace(self, options={name: text for name, text in left.items() if name not in needs or name in acting})
+        return replace(self, options=self.acting({name: text for name, text in self.options.items() if name not in names}))
+
+    def acting(self, options: Mapping[str, str]) -> dict[str, str]:
+        """Options without the settings that have no effect beside the others."""
+        needs = {name: self.settings[name].needs if name in self.settings else () for name in options}
+        is_met = {need: options.get(need[0], self._default(need[0])) in need[1:] for of_one in needs.values() for need in of_one}
+        return {name: text for name, text in options.items() if all(is_met[need] for need in needs[name])}
+
+    def allows(self, name: str, value: str) -> bool:
+        """Whether a text is an allowed value of a setting, or of an option in `choices`."""
+        return self.settings[name].parsed(value) is not None if name in self.settings else value in self.choices[name]
 
     @property
     def label(self) -> str:

@@ -102,7 +102,7 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, conver
             verdict, reason = "limited" if explained else "failed", joined(*explained, f"{reason}; no time step removes it")
     reason += f" ({convergence.remark})" if convergence.remark else ""
     if verdict == "failed" and budget.cause == "setting":
-        reason += ", but calibrated settings reduce or remove it: it is a setting error"
+        reason += ", but calibrated settings remove more than half of it: it is a setting error"
     # The result of time steps that leave the cause open is not compared with that of another run.
     tolerance = math.nan if budget.cause == "unresolved" else budget.upper - budget.lower
     return Judgement(budget.asymptotic_error, verdict, budget.lower, budget.upper, budget.cause, reason, tolerance)

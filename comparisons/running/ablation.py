@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from itertools import combinations
+from typing import Any
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.settings import spelled
@@ -20,6 +21,8 @@ from dropspin.comparisons.running.driving import verify_accepted
 from dropspin.scenarios import DropspinError, Scenario
 
 Reverted = frozenset[str]
+ALL_SETTINGS = "profile=calibrated"
+"""Stands for all settings in the results, for the share of an error that calibrated settings remove."""
 ENOUGH = 0.9
 """Share of an error that explains it."""
 NOTEWORTHY = 1e-3
@@ -29,7 +32,7 @@ MOST = 0.5
 explained.
 """
 ADDITIVE = 0.02
-"""Largest difference between the share of two settings and the sum of theirs where each has its own."""
+"""Largest difference between the share of two settings and the sum of theirs where each has its own, relative to the sizes of these."""
 
 
 def shares(
@@ -84,7 +87,8 @@ def shares(
     if len(best) == 1:
         [pair] = best
         of_each: dict[tuple[str, ...], float] = {(name,): single[name] for name in pair}
-        if min(map(abs, of_each.values())) >= NOTEWORTHY and abs(sum(of_each.values()) - best[pair]) <= ADDITIVE:
+        sizes = [abs(part) for part in of_each.values()]
+        if min(sizes) >= NOTEWORTHY and abs(sum(of_each.values()) - best[pair]) <= ADDITIVE * max(1.0, sum(sizes)) < math.inf:
             return of_each
     return best
 
@@ -113,6 +117,28 @@ def explaining(
     return {", ".join(f"{name}={engine.options[name]}" for name in names): share for names, share in found.items()}
 
 
+def explaining_failure(engine: Engine, options: Mapping[str, str], error_of: Callable[[Engine], float]) -> dict[str, float]:
+    """The settings that explain an error that fails: `explaining`, also partly. Empty if settings are not most of it.
+
+    Args:
+        engine: The engine.
+        options: Its options, from `written_out`.
+        error_of: The error of an engine; NaN if it is undefined.
+
+    Returns:
+        The shares; before them, by `ALL_SETTINGS`, the share of the error that calibrated settings take away, unless it is about all.
+    """
+    written = replace(engine, options=options)
+    changed = [name for name in options if name not in written.calibrated.options]
+    error, calibrated = error_of(written), error_of(written.calibrated)
+    if not changed or not abs(calibrated) < MOST * abs(error):
+        return {}
+    if not abs(error - error_of(engine)) <= (1.0 - ENOUGH) * abs(error):
+        return {}  # settings that have no option, or that are not reported, err too
+    found, removed = explaining(written, dict.fromkeys(changed), error_of, partly=True), 1.0 - calibrated / error
+    return {ALL_SETTINGS: removed, **found} if found and abs(1.0 - removed) > 1.0 - ENOUGH else found
+
+
 def written_out(entry: EngineEntry, scene: Scenario, dt: float) -> dict[str, str]:
     """The options that make an engine of the calibrated one, also if its profile is default; runs in the engine's process."""
     engine = entry.adapter
@@ -120,15 +146,23 @@ def written_out(entry: EngineEntry, scene: Scenario, dt: float) -> dict[str, str
         return dict(engine.options)
     calibrated, wanted = engine.calibrated, _in_force(engine, scene, dt)
     found = _in_force(calibrated, scene, dt)
-    differing = {name: text for name, text in wanted.items() if text != (found[name] if name in found else calibrated.option(name))}
-    return {**calibrated.options, **differing}
+    return calibrated.acting({**calibrated.options, **{name: text for name, text in wanted.items() if text != found[name]}})
 
 
 def _in_force(engine: Engine, scene: Scenario, dt: float) -> dict[str, str]:
-    """The settings and options of an engine that are in force in a scene, as text."""
+    """The settings and options of an engine that are in force in a scene, as text: as reported, or else as they are given."""
     verify_accepted(engine, scene)
     with engine.prepare(scene, dt) as simulation:
-        found = verified_settings(simulation.settings)
-    own = {name: setting.default for name, setting in engine.settings.items() if engine.unmet_need(name) is None}
-    names = [name for name in (*engine.choices, *own) if name != "profile" and (name in found or name in own)]
-    return {name: spelled(found[name] if name in found else own[name]) for name in names}
+        reported = verified_settings(simulation.settings)
+    names = [name for name in (*engine.choices, *engine.settings) if name != "profile"]
+    return {
+        name: text if name in reported and engine.allows(name, text := _text(reported[name])) else engine.option(name) for name in names
+    }
+
+
+def _text(value: Any) -> str:
+    """A reported value as an option; empty if it is no value of an option, such as a list of tables."""
+    try:
+        return spelled(value)
+    except (TypeError, ValueError):
+        return ""

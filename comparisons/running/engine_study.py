@@ -30,7 +30,7 @@ from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.provenance import motion_digest
 from dropspin.comparisons.results.table import Case, Measurement
-from dropspin.comparisons.running.ablation import explaining, written_out
+from dropspin.comparisons.running.ablation import MOST, explaining_failure, written_out
 from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, divergence
 from dropspin.comparisons.running.engine_entries import engine_entry
@@ -44,6 +44,8 @@ from dropspin.scenarios.text import with_few_digits
 
 VANISHING = 0.5
 """Share of an error below which what may remain of it with finer options counts as nothing, as in an error budget."""
+TURNED = 1.0
+"""An error of the orientation above this [rad] does not grow in proportion to what causes it."""
 FEWEST_STEPS = 8
 """A run of fewer steps is not worth adding."""
 
@@ -179,27 +181,26 @@ class EngineStudy:
             return
         dt = min(row.dt for row in failing)
         sizes = {row.metric: abs(row.value) / scale(scene, row.unit) for row in failing if row.dt == dt}
-        metric = METRICS[max(sizes, key=lambda name: (name == leading_metric(scene), sizes[name]))]
+        turned = {name for name, size in sizes.items() if METRICS[name].unit == "rad" and size > TURNED}
+        metric = METRICS[max(sizes, key=lambda name: (name not in turned, name == leading_metric(scene), sizes[name]))]
         options = self.processes.call(self.entry, written_out, scene, dt)
         if isinstance(options, Breakdown):
             return
-        error_of = self.error_of(metric, dt)
-        written = replace(engine, options=options)
-        changed = [name for name in options if name not in written.calibrated.options]
-        if not changed or not abs(error_of(written.calibrated)) < 0.5 * sizes[metric.name] * scale(scene, metric.unit):
-            return  # it is not the settings that err
         case = Case(scene.name, self.entry.label, dt, scene.steps(dt))
-        for settings, share in explaining(written, dict.fromkeys(changed), error_of, partly=True).items():
+        for settings, share in explaining_failure(engine, options, self.error_of(metric, dt)).items():
             yield case.measurement("setting", metric.name, "1", Judgement(share, "measured"), settings)
 
     def error_of(self, metric: Metric, dt: float) -> Callable[[Engine], float]:
         """A function of the engine with other options: its error at a time step [s], from few starts; NaN if it has none."""
         phases = phases_at(self.own._replace(quick=True), dt)
+        found: dict[str, float] = {}
 
         def error(engine: Engine) -> float:
-            progress = Progress(self.own.scene.name, self.entry.label, dt, added=True)
-            outcome, _ = self._measured(engine_entry(engine), phases, progress, Timing(), perturbs=False)
-            return outcome.points[metric.name].average.value if metric.name in outcome.points else math.nan
+            if engine.label not in found:
+                progress = Progress(self.own.scene.name, self.entry.label, dt, added=True)
+                outcome, _ = self._measured(engine_entry(engine), phases, progress, Timing(), perturbs=False)
+                found[engine.label] = outcome.points[metric.name].average.value if metric.name in outcome.points else math.nan
+            return found[engine.label]
 
         return error
 
@@ -232,7 +233,7 @@ class EngineStudy:
                             it refutes the model error: `is_refuted`
             4. refined      an error that does not vanish with the time step alone, but together with the options that set the accuracy of
                             the engine, is attributed to these options
-            5. calibrated   a model error is a setting error if the engine with calibrated settings has none or a smaller one
+            5. calibrated   a model error is a setting error if the engine with calibrated settings has none, or less than half of it
             6. jumping      a metric that jumps from flight to flight may stay at a value while the error that causes it falls: `of_jump`
 
         Returns:
@@ -260,9 +261,10 @@ class EngineStudy:
         if engine.accuracy and found.budget.cause in ("model", "unresolved") and not math.isnan(found.budget.asymptotic_error):
             found = self._attributed_to_options(metric, found, engine.refined(dts))
         if found.budget.cause == "model" and self.calibrated is not None and name in self.calibrated.series:
-            calibrated = self.calibrated.cause(name).budget
-            if max(-calibrated.lower, calibrated.upper) < max(found.budget.lower, -found.budget.upper):
-                found = replace(found, budget=replace(found.budget, cause="setting"))
+            budget, calibrated = found.budget, self.calibrated.cause(name).budget
+            is_smaller = max(-calibrated.lower, calibrated.upper) < max(budget.lower, -budget.upper)
+            if is_smaller and abs(calibrated.asymptotic_error) < MOST * abs(budget.asymptotic_error):
+                found = replace(found, budget=replace(budget, cause="setting"))
         if name in JUMPING and found.budget.cause == "model":
             others = {other: self.cause(other).budget.cause for other in self.series if other != name}
             found = of_jump(found, [(METRICS[other], cause, self.series[other]) for other, cause in others.items()])

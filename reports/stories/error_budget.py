@@ -10,7 +10,10 @@ from dropspin.reports.stories.numbers import Row, formatted, observed_order
 
 EXPLAINED = {"known": "Expected", "limited": "Known limitation"}
 """The words before the reason of an expected model error, by verdict."""
-LASTING = {"setting": "setting error, which calibrated settings reduce or remove", "model": "model error, which no time step removes"}
+LASTING = {
+    "setting": "setting error, of which calibrated settings remove more than half",
+    "model": "model error, which no time step removes",
+}
 """The words for an error that does not vanish as dt → 0, by cause."""
 STATED = ("value", "lower", "upper", "cause", "verdict", "reason")
 """The columns that a budget has of the asymptotic error, and of the order."""

@@ -11,6 +11,7 @@ from dropspin.comparisons.judging.verdicts import FAILURES
 from dropspin.comparisons.measuring.symmetries import kind_of
 from dropspin.comparisons.regressions.causes import WrongParameter, causes
 from dropspin.comparisons.results.results import MOST_NAMES, Results
+from dropspin.comparisons.running.ablation import ALL_SETTINGS
 from dropspin.comparisons.running.process_limits import ResourceLimits
 from dropspin.reports.document import Paragraph, Part, Sentences
 from dropspin.reports.stories.numbers import Row, bound, explained_by, formatted, grouped, in_ms, listed, step, subject, word
@@ -132,8 +133,12 @@ def settings_that_explain(results: Results, engine: str) -> Iterator[str]:
     alike = grouped(by_scene.items(), lambda item: (item[0][1], *(row["truth"] for row in item[1])))
     for ((scene, metric, dt), rows), *others in alike.values():
         also = f"; the same settings explain it in {listed([where for (where, *_), _ in others])}" if others else ""
-        error = f"of the {subject(metric, 'truth', '')} at {in_ms(dt)}"
-        yield f"{scene}: {explained_by({row['truth']: row['value'] for row in rows}, error)}{also}."
+        found, error = {row["truth"]: row["value"] for row in rows}, f"of the {subject(metric, 'truth', '')} at {in_ms(dt)}"
+        removed, of_this = found.pop(ALL_SETTINGS, None), ""
+        if removed is not None:
+            sign = ", so that an error of the other sign is left" if removed > 1.0 else ""
+            of_this, error = f"calibrated settings take away {rounded(100.0 * removed, 3)} % {error}{sign}; ", "of this"
+        yield f"{scene}: {of_this}{explained_by(found, error)}{also}."
 
 
 def _described(wrong: WrongParameter) -> str:

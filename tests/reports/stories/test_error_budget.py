@@ -54,7 +54,7 @@ def budget(results):
         ),
         (
             made(0.8, asymptotic=(0.9, 0.89, 0.91, "setting")),
-            "0.900 is a setting error, which calibrated settings reduce or remove; the remaining -0.100 is discretisation error.",
+            "0.900 is a setting error, of which calibrated settings remove more than half; the remaining -0.100 is discretisation error.",
         ),
         (made(4e-2, asymptotic=(4.05e-2, 3.9e-2, 4.2e-2, "model")), "A model error, which no time step removes."),
         (

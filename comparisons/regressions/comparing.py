@@ -1,12 +1,15 @@
 """Two runs compared: the results that changed, and the causes to which the changes are attributed."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import pandas as pd
 
+from dropspin.comparisons.judging.verdicts import FAILURES
 from dropspin.comparisons.regressions.attribution import Attribution, attribute, surroundings
 from dropspin.comparisons.regressions.changes import (
+    KEY,
     EqualMotions,
     Motion,
     SpeedChange,
@@ -36,6 +39,7 @@ class Changes(NamedTuple):
         in_one_only: Scenes, engines and time steps that were requested in only one of the runs, as text.
         speed: For pairs of engines, the change of the ratio of their times per step.
         motions: How many motions of each engine are equal bit for bit in both runs; empty if the runs were loaded without trajectories.
+        judged_otherwise: By engine, earlier and later verdict, the number of results that are the same and fail in one of the runs alone.
     """
 
     results: pd.DataFrame
@@ -45,6 +49,7 @@ class Changes(NamedTuple):
     in_one_only: list[str]
     speed: list[SpeedChange]
     motions: list[EqualMotions]
+    judged_otherwise: Mapping[tuple[str, str, str], int]
 
     def of(self, *kinds: str) -> pd.DataFrame:
         """The results with the given kinds of change."""
@@ -77,12 +82,29 @@ def compare(old: Results, new: Results) -> Changes:
     verify_comparable(old, new)
     other, found = _changed_scenes(old, new), results_in_common(old, new)
     if found.empty:
-        why = f"{', '.join(other)} changed between them" if other else "no scene, engine and time step was requested in both"
-        raise DropspinError(f"the runs have no result in common: {why}.")
+        raise DropspinError(f"the runs have no result in common: {_why_nothing_is_compared(old, new, other)}.")
     changed, unmoved = found[found["change"] != "same"].groupby("engine"), unmoved_engines(found)
     attributions = {str(engine): attributed(rows, old, new, str(engine), unmoved) for engine, rows in changed}
     around = list(surroundings(old.provenance, new.provenance).values())
-    return Changes(found, attributions, around, other, _in_one_only(old, new), speed_changes(old, new), equal_motions(old, new, other))
+    motions, judged = equal_motions(old, new, other), _judged_otherwise(old, new, found)
+    return Changes(found, attributions, around, other, _in_one_only(old, new), speed_changes(old, new), motions, judged)
+
+
+def _why_nothing_is_compared(old: Results, new: Results, other: Sequence[str]) -> str:
+    if other:
+        return f"{', '.join(other)} changed between them"
+    if all(set(of_old) & set(of_new) for of_old, of_new in zip(*_asked(old, new), strict=True)):
+        return "of what was requested in both, one of them at least has no results"
+    return "no scene, engine and time step was requested in both"
+
+
+def _judged_otherwise(old: Results, new: Results, found: pd.DataFrame) -> dict[tuple[str, str, str], int]:
+    """`Changes.judged_otherwise`: such results have other bounds, or a limitation is declared in one of the runs alone."""
+    same = found.loc[found["change"] == "same", KEY]
+    verdicts = [comparable_results(results)[[*KEY, "verdict"]] for results in (old, new)]
+    both = same.merge(verdicts[0], on=KEY).merge(verdicts[1], on=KEY, suffixes=("_before", "_after"))
+    both = both[both["verdict_before"].isin(FAILURES) != both["verdict_after"].isin(FAILURES)]
+    return dict(Counter(both[["engine", "verdict_before", "verdict_after"]].itertuples(index=False, name=None)))
 
 
 def _changed_scenes(old: Results, new: Results) -> list[str]:
@@ -110,8 +132,13 @@ def attributed(rows: pd.DataFrame, old: Results, new: Results, engine: str, unmo
     return attribute(*stamps, engine, unmoved, together)
 
 
+def _asked(*runs: Results) -> list[tuple[Sequence[float], Sequence[str], Sequence[str]]]:
+    """The time steps [s], scenes and engines of each run."""
+    return [(results.provenance["asked"]["dts"], list(results.scenes), results.engines) for results in runs]
+
+
 def _in_one_only(old: Results, new: Results) -> list[str]:
-    asked = [(results.provenance["asked"]["dts"], list(results.scenes), results.engines) for results in (old, new)]
+    asked = _asked(old, new)
     return [
         f"{word} {thing:g} s ({which})" if word == "step" else f"{word} {thing} ({which})"
         for which, mine, other in (("gone", *asked), ("new", *reversed(asked)))

@@ -109,6 +109,7 @@ def accepted_sentences(results: Results, accepted: pd.DataFrame, known_failures:
     kinds = [f"{changed[kind]:,} {kind}" for kind in order if kind in changed]
     measured = ", ".join(engine for engine in results.engines if (accepted["engine"] == engine).any())
     notes = [f"Accepted for {counted(len(results.scenes), 'scene')} with {measured}: {', '.join(kinds) or 'no results'}."]
+    notes += not_repeated(results)
     removed = accepted.drop(asked_for(accepted, results).index).query("change in ['gone', 'undefined']")
     if len(removed):
         pairs = ", ".join(f"{scene} with {engine}" for scene, engine in removed[["scene", "engine"]].drop_duplicates().to_numpy())

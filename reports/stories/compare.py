@@ -85,6 +85,9 @@ def _notes(changes: Changes) -> list[str]:
         kinds = changes.results.loc[changes.results["engine"] == engine, "change"]
         counts = ", ".join(f"{count:,} {change}" for change in TITLES if (count := int((kinds == change).sum())))
         notes.append(f"{engine}: {counts}. {capitalized(cause.message)}.")
+    for (engine, before, after), count in changes.judged_otherwise.items():
+        are = counted(count, "result with the same value is", "results with the same values are")
+        notes.append(f"{engine}: {are} now {after} instead of {before}.")
     if changes.surroundings and not changes.attributions:
         notes.append(f"No result has changed, although these differ between the runs: {', '.join(changes.surroundings)}.")
     if changes.other_scenes:
@@ -118,5 +121,9 @@ def as_data(changes: Changes) -> dict[str, Any]:
         "other_scenes": changes.other_scenes,
         "in_one_only": changes.in_one_only,
         "motions": [motions._asdict() for motions in changes.motions],
+        "judged_otherwise": [
+            {"engine": engine, "before": before, "now": after, "results": count}
+            for (engine, before, after), count in changes.judged_otherwise.items()
+        ],
         "speed": [change._asdict() for change in changes.speed],
     }

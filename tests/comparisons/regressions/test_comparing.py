@@ -9,6 +9,7 @@ from support.releases import DTS, SCENES, TURNING, Broken, Candidate, WithoutGyr
 from dropspin.comparisons.regressions.changes import speed_changes
 from dropspin.comparisons.regressions.comparing import compare
 from dropspin.comparisons.running.run import run
+from dropspin.reports.stories.compare import document
 from dropspin.scenarios import DropspinError
 
 
@@ -52,11 +53,27 @@ def test_what_one_run_was_not_asked_for_is_neither_new_nor_gone(before):
     ]
 
 
+def test_results_with_the_same_values_that_are_judged_otherwise_are_counted(before):
+    """Such as those that a limitation explained which the engine no longer declares: no value is worse, but checks fail now."""
+    table = before.table
+    fails = (table["metric"] == "energy_error") & (table["engine"] == "candidate") & (table["kind"] == "truth")
+    limited, failed = (replace(before, table=table.assign(verdict=table["verdict"].mask(fails, to))) for to in ("limited", "failed"))
+    found, count = compare(limited, failed), int(fails.sum())
+    assert found.judged_otherwise == {("candidate", "limited", "failed"): count}
+    [sentence] = [text for text in document(found, failed).summary[0].items if "instead" in text]
+    assert sentence == f"candidate: {count} results with the same values are now failed instead of limited."
+    assert compare(failed, limited).judged_otherwise == {("candidate", "failed", "limited"): count}
+    assert not compare(failed, failed).judged_otherwise
+
+
 def test_runs_without_a_common_result_are_refused(before, longer_fall):
     with pytest.raises(DropspinError, match=r"^the runs have no result in common: no scene, engine and time step was requested in both\.$"):
         compare(part(before, "drop-ball"), part(before, "fall-spin"))
     with pytest.raises(DropspinError, match=r"^the runs have no result in common: fall-spin changed between them\.$"):
         compare(part(before, "fall-spin"), longer_fall)
+    broken = replace(before, table=before.table.assign(value=np.nan))
+    with pytest.raises(DropspinError, match=r": of what was requested in both, one of them at least has no results\.$"):
+        compare(broken, broken)
 
 
 def with_times(results, factors, noise=0.0):

@@ -32,9 +32,16 @@ def conformance(*results):
 
 def comparison(*changes, **content):
     table = pd.DataFrame({"change": changes}, dtype=str).assign(engine="a", scene="s", kind="truth", metric="energy_error")
-    found = Changes(
-        table, **({"attributions": {}, "surroundings": [], "other_scenes": [], "in_one_only": [], "speed": [], "motions": []} | content)
-    )
+    none = {
+        "attributions": {},
+        "surroundings": [],
+        "other_scenes": [],
+        "in_one_only": [],
+        "speed": [],
+        "motions": [],
+        "judged_otherwise": {},
+    }
+    found = Changes(table, **(none | content))
     return " ".join([*compare._notes(found), compare._verdict(found)])
 
 

@@ -43,6 +43,8 @@ def replay_command(
         if output is not None:
             raise click.UsageError(f"-o {output} names the page, but with {option} no page is written; leave -o out.")
     file = Path(run) / "replay.html" if output is None else Path(output)
+    if (ending := file.suffix.lower()) in (".gif", ".mp4"):
+        raise click.UsageError(f"-o {output} names the page, which is HTML; give --{ending[1:]} {output} for a film.")
     if output is None and file.is_symlink():  # the run may be somebody else's, and the link lead to any file
         raise DropspinError(f"{file}: is a link; delete it, or choose a file with -o.")
     results = load_results(Path(run))

@@ -273,6 +273,7 @@ def test_gif_is_four_times_slower_than_real_time_by_default():
         (["drop-ball", "--gif", "clip.gif", "--speed", "1e-9"], "a film at a speed of 1e-09 has more than 5,000 frames"),
         (["drop-ball", "--gif", "/dev/null/clip.gif"], "/dev/null/clip.gif: cannot be written: File exists; choose another file."),
         (["drop-ball", "--gif", "clip.gif", "-o", "page.html"], "-o page.html names the page"),
+        (["drop-ball", "-o", "page.GIF"], "-o page.GIF names the page, which is HTML; give --gif page.GIF for a film"),
         (["--gif", "clip.gif"], "name it: drop-box-corner"),
         (["drop-ball", "--dt", "-1"], "--dt"),
     ],

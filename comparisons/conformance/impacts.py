@@ -36,12 +36,15 @@ from dropspin.scenarios.variations import with_height
 
 CLOSE = 5e-3
 """The largest difference of an explained change of the velocities, relative to that change; gravity acts before or after an impact."""
+ALIKE = 5e-4
+"""Such differences that tell two mistakes apart."""
 APART = 4.0
 """Multiple of it by which a stated mistake differs from an impact without rebound."""
 AGAINST = "friction has the wrong sign: it acts along the slip of the contact point, and has to act against it"
 IN_FRICTION = f"{SQUARE}: in friction, whose impulse is at most µ times that of the normal force, along the slip over its length"
 IN_NORMAL = f"{SQUARE}: the separation speed is e times the approach speed"
 REVERSED = "friction has the wrong sign: it reverses the slip of the contact point, and has to reduce it"
+BEYOND = "friction has no limit: it reverses the slip of the contact point, because the factor 1 - µ (1 + e) |u_n|/|u_t| may be negative"
 INTO_FLOOR = "restitution has the wrong sign: the contact point goes on into the floor"
 OF_REBOUND = (IN_NORMAL, INTO_FLOOR)
 AT_START = "the inertia is rotated by the orientation at the start: in the world frame it is R I Rᵀ with the R of the impact"
@@ -128,9 +131,9 @@ def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:
     contact = Contact(velocities, case.contact_point(row), scene.body.mass, scene.body.inertia_tensor, axes, at_start, scene.floor)
     weights = np.array([1.0] * 3 + [scene.body.size] * 3)
 
-    def explains(predicted: Array | None, close: float = CLOSE) -> bool:
+    def off(predicted: Array | None) -> float:
         scale = np.linalg.norm(weights * (after - velocities))
-        return predicted is not None and bool(np.linalg.norm(weights * (after - predicted)) <= close * scale)
+        return np.inf if predicted is None else float(np.linalg.norm(weights * (after - predicted)) / scale)
 
     if contact.approach[1] >= 0.0:
         return None
@@ -139,14 +142,16 @@ def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:
     faulty = [fault.simulated(scene).floor for fault in FAULT_MODELS if fault.about == "friction"]
     others = [floor for floor in faulty if floor and 0.0 < floor.coefficient < scene.floor.coefficient < np.inf]
     floors, of_body = (scene.floor, frictionless, *others), (before, contact.point, contact.mass, contact.inertia)
-    laws = [law for law in LAWS if any(explains(velocities_after(*of_body, floor, law)) for floor in floors)]
+    laws = [law for law in LAWS if any(off(velocities_after(*of_body, floor, law)) <= CLOSE for floor in floors)]
     if laws:
         return OF_NOTE if laws == ["note"] and scene.floor == frictionless else None
     # As when the floor supports a body from the first step on.
     dead = [floor.model_copy(update={"restitution": 0.0}) for floor in (scene.floor, frictionless)]
-    if any(explains(velocities_after(*of_body, floor, law), APART * CLOSE) for floor, law in product(dead, LAWS)):
+    if any(off(velocities_after(*of_body, floor, law)) <= APART * CLOSE for floor, law in product(dead, LAWS)):
         return None
-    return next((message for message, predicted in _predictions(contact) if explains(predicted)), None)
+    found = [(off(predicted), message) for message, predicted in _predictions(contact)]
+    least = min(found)[0]  # without friction a wrong rebound may come near that of a wrong inertia
+    return next((message for size, message in found if size <= least + ALIKE), None) if least <= CLOSE else None
 
 
 def _predictions(contact: Contact) -> Iterator[tuple[str, Array]]:
@@ -188,6 +193,8 @@ def _impulses(contact: Contact, response: Array) -> Iterator[tuple[str, Array]]:
     if limit == 0.0:
         return
     yield REVERSED, by_slip(rebound, 2.0 - share)
+    if 1.0 < limit < np.inf:
+        yield BEYOND, by_slip(rebound, limit)
     for against in {share, limit} - {np.inf}:
         yield AGAINST, by_slip(rebound, -against)
     if np.isfinite(friction):

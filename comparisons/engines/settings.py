@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from dropspin.scenarios.text import printable
+
 Value = bool | int | float | str | tuple[float, ...]
 """The value of a setting."""
 SWITCH = {"false": 0, "no": 0, "off": 0, "disable": 0, "0": 0, "true": 1, "yes": 1, "on": 1, "enable": 1, "1": 1}
@@ -101,3 +103,9 @@ def spelled(value: Value | Sequence[float]) -> str:
     if isinstance(value, Sequence):
         return " ".join(map(spelled, value))
     return f"{value:g}" if float(f"{value:g}") == value else repr(float(value))
+
+
+def as_option(reported: Any) -> str:
+    """The value of a setting as a simulation reports it, in the form of an option, if it is one; else any text."""
+    numbers = isinstance(reported, list) and all(isinstance(part, int | float) for part in reported)
+    return printable(spelled(reported) if numbers or isinstance(reported, str | int | float) else str(reported))

@@ -54,8 +54,12 @@ def _rows(changed: "pd.Series[Any]", results: Results, baseline: Baseline, impor
     engine = engine_entry(name).engine if name and (imports or not is_foreign(parsed(name)[0])) else None
     stamp = baseline.acceptances[changed["by"]].stamp_of(label)
     now, accepted = common_settings(results.provenance, label), changed_settings(stamp, results.provenance, label)
-    back = {name: text for name, text in accepted.items() if engine and name in engine.settings and engine.unmet_need(name) is None}
-    if engine is None or not back:
+    if engine is None:
+        return
+    acting = [name for name in accepted if name in engine.settings and engine.unmet_need(name) is None]
+    # An adapter may report other words than its options have, or none.
+    back = {name: accepted[name] for name in acting if engine.allows(name, accepted[name]) and engine.allows(name, now.get(name, ""))}
+    if not back:
         return
     entry = engine_entry(replace(engine, options={**engine.options, **{name: now[name] for name in back}}))
     with EngineProcesses(ResourceLimits()) as processes:

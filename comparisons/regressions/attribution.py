@@ -5,7 +5,7 @@ from typing import Any, Literal, NamedTuple
 
 from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.engines.registry import BUILT_IN
-from dropspin.comparisons.engines.settings import spelled
+from dropspin.comparisons.engines.settings import as_option
 from dropspin.comparisons.regressions.changes import Motion
 from dropspin.comparisons.results.provenance import MEASURING
 from dropspin.scenarios.text import printable
@@ -59,7 +59,7 @@ def surroundings(old: Stamp, new: Stamp) -> dict[str, str]:
 
 def common_settings(stamp: Stamp, engine: str) -> dict[str, str]:
     """The settings that are the same in all cases of an engine, as text, but for long ones."""
-    cases = [{name: _text(value) for name, value in case.items()} for case in stamp["settings"].get(engine, {}).values()]
+    cases = [{name: as_option(value) for name, value in case.items()} for case in stamp["settings"].get(engine, {}).values()]
     common = [setting for setting in (cases[0] if cases else {}).items() if all(setting in case.items() for case in cases)]
     return {name: text for name, text in common if name not in VERSIONS and len(text) <= LONGEST}
 
@@ -74,14 +74,8 @@ def changed_settings(old: Stamp, new: Stamp, engine: str) -> dict[str, str]:
     if ACCEPTED in before:
         accepted, now = before[ACCEPTED], common_settings(new, engine)
         pairs = [({name: accepted[name] for name in accepted if name in now}, {name: now[name] for name in now if name in accepted})]
-    texts = [[{name: _text(value) for name, value in case.items() if name not in VERSIONS} for case in pair] for pair in pairs]
+    texts = [[{name: as_option(value) for name, value in case.items() if name not in VERSIONS} for case in pair] for pair in pairs]
     return {name: was.get(name, "") for was, now in texts for name in {**was, **now} if was.get(name) != now.get(name)}
-
-
-def _text(value: Any) -> str:
-    """The value of a setting as an option has it, if it is one."""
-    plain = isinstance(value, str | int | float) or (isinstance(value, list) and all(isinstance(part, int | float) for part in value))
-    return printable(spelled(value) if plain else str(value))
 
 
 def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Origin, str]:

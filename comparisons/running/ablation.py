@@ -11,10 +11,9 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from itertools import combinations
-from typing import Any
 
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.engines.settings import spelled
+from dropspin.comparisons.engines.settings import as_option
 from dropspin.comparisons.running.adapter_output import verified_settings
 from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import verify_accepted
@@ -155,14 +154,5 @@ def _in_force(engine: Engine, scene: Scenario, dt: float) -> dict[str, str]:
     with engine.prepare(scene, dt) as simulation:
         reported = verified_settings(simulation.settings)
     names = [name for name in (*engine.choices, *engine.settings) if name != "profile"]
-    return {
-        name: text if name in reported and engine.allows(name, text := _text(reported[name])) else engine.option(name) for name in names
-    }
-
-
-def _text(value: Any) -> str:
-    """A reported value as an option; empty if it is no value of an option, such as a list of tables."""
-    try:
-        return spelled(value)
-    except (TypeError, ValueError):
-        return ""
+    texts = {name: as_option(value) for name, value in reported.items()}
+    return {name: texts[name] if name in texts and engine.allows(name, texts[name]) else engine.option(name) for name in names}

@@ -56,3 +56,17 @@ def test_changed_setting_that_takes_none_of_a_change_away_explains_nothing():
     [(_, cause)] = checked.attributions
     assert "solimp" in cause.message
     assert with_explaining_settings(checked, lower, imports=True).results.table.query("kind == 'setting'").empty
+
+
+def test_setting_that_is_reported_in_other_words_than_its_option_has_explains_nothing():
+    """Such as the number of a word in an enumeration."""
+    ball = load("drop-ball").model_copy(update={"duration": 0.8})
+    found = run(ball, "mujoco", 4e-3)
+    accepted, _ = accept(found, Baseline(), "first", datetime.date(2026, 3, 1))
+    cases = {case: settings | {"cone": 7} for case, settings in found.provenance["settings"]["mujoco"].items()}
+    table = found.table.assign(value=found.table["value"].mask(found.table["metric"] == "energy_error", 0.5))
+    worse = replace(found, table=table, provenance=found.provenance | {"settings": {"mujoco": cases}})
+    checked = check(worse, accepted)
+    [(_, cause)] = checked.attributions
+    assert "cone" in cause.message
+    assert with_explaining_settings(checked, accepted, imports=True).results.table.equals(checked.results.table)

@@ -125,7 +125,8 @@ def explaining_failure(engine: Engine, options: Mapping[str, str], error_of: Cal
         error_of: The error of an engine; NaN if it is undefined.
 
     Returns:
-        The shares; before them, by `ALL_SETTINGS`, the share of the error that calibrated settings take away, unless it is about all.
+        The shares; before them, by `ALL_SETTINGS`, the share of the error that calibrated settings take away, unless it is about all and
+        there are shares.
     """
     written = replace(engine, options=options)
     changed = [name for name in options if name not in written.calibrated.options]
@@ -135,7 +136,7 @@ def explaining_failure(engine: Engine, options: Mapping[str, str], error_of: Cal
     if not abs(error - error_of(engine)) <= (1.0 - ENOUGH) * abs(error):
         return {}  # settings that have no option, or that are not reported, err too
     found, removed = explaining(written, dict.fromkeys(changed), error_of, partly=True), 1.0 - calibrated / error
-    return {ALL_SETTINGS: removed, **found} if found and abs(1.0 - removed) > 1.0 - ENOUGH else found
+    return found if found and abs(1.0 - removed) <= 1.0 - ENOUGH else {ALL_SETTINGS: removed, **found}
 
 
 def written_out(entry: EngineEntry, scene: Scenario, dt: float) -> dict[str, str]:

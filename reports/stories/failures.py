@@ -126,6 +126,9 @@ def _consistent_with(results: Results, engine: str) -> list[str]:
     return [f"Possible cause of the asymptotic errors of {engine}: {listed_causes}."] if listed_causes else []
 
 
+NONE_ALONE = "no single setting explains half of this, and no two explain 90 %"
+
+
 def settings_that_explain(results: Results, engine: str) -> Iterator[str]:
     """A sentence for each error that changed settings of an engine explain; scenes with the same settings share a sentence."""
     mine = results.table[(results.table["kind"] == "setting") & (results.table["engine"] == engine)].to_dict("records")
@@ -138,7 +141,7 @@ def settings_that_explain(results: Results, engine: str) -> Iterator[str]:
         if removed is not None:
             sign = ", so that an error of the other sign is left" if removed > 1.0 else ""
             of_this, error = f"calibrated settings take away {rounded(100.0 * removed, 3)} % {error}{sign}; ", "of this"
-        yield f"{scene}: {of_this}{explained_by(found, error)}{also}."
+        yield f"{scene}: {of_this}{explained_by(found, error) if found else NONE_ALONE}{also}."
 
 
 def _described(wrong: WrongParameter) -> str:

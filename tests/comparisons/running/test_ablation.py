@@ -1,7 +1,7 @@
 """Which changed settings explain an error: planted changes of one and of two settings, and functions of which the shares are known."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import pytest
@@ -155,6 +155,9 @@ class Losing(Engine):
     }
 
     def prepare(self, scene, dt):
+        return self.losing(scene, dt)
+
+    def losing(self, scene, dt):
         lost = self.model + sum(float(self.option(name)) for name in ("soft", "slow"))
         simulation = Sampled(scene, dt, with_restitution(lambda e: (1.0 - lost) * e)(scene), undistorted)
         simulation.settings = self.reported(self)
@@ -200,6 +203,23 @@ def test_share_of_settings_beside_a_model_error_is_stated():
     opposite, _, [sentence] = of_default_profile(model=-0.01)
     assert opposite["profile=calibrated"] == pytest.approx(1.0 + (1.01**2 - 1.0) / (1.0 - 0.955**2), abs=1e-3)
     assert "so that an error of the other sign is left" in sentence
+
+
+def test_settings_of_which_no_two_explain_an_error_are_stated_together():
+    """Three that take a third each."""
+
+    class Thirds(Losing):
+        settings: ClassVar = {name: Setting(0.02, "takes this share", calibrated=0.0) for name in ("soft", "slow", "rest")}
+
+        def prepare(self, scene, dt):
+            return replace(self, model=float(self.option("rest"))).losing(scene, dt)
+
+    ball = load("drop-ball").model_copy(update={"duration": 0.8})
+    results = run(ball, [Thirds({"profile": "default"})], [1e-3], quick=True)
+    found = results.table[results.table["kind"] == "setting"].set_index("truth")["value"].to_dict()
+    assert found == {"profile=calibrated": pytest.approx(1.0, abs=0.01)}
+    [sentence] = settings_of(results, "losing[profile=default]")
+    assert sentence.endswith("of the bounce height error at 1 ms; no single setting explains half of this, and no two explain 90 %.")
 
 
 def test_settings_that_make_less_than_half_of_an_error_are_not_its_cause():

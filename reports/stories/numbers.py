@@ -120,7 +120,7 @@ def explained_by(shares: Mapping[str, float], error: str) -> str:
     if len(shares) > 1 and sum(shares.values()) > SEVERAL:
         return f"either {', or '.join(names)} {explain} {sizes[0]} {error}"
     if are_together:
-        return f"{names[0]} together explain {sizes[0]} {error}; neither alone explains 90 % of that"
+        return f"{names[0]} together explain {sizes[0]} {error}; neither alone explains 90 %"
     others = zip(names[1:], sizes[1:], strict=True)
     return f"{names[0]} explains {sizes[0]} {error}" + "".join(f", and {name} {size}" for name, size in others)
 

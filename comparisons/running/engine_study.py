@@ -23,14 +23,14 @@ from dropspin.comparisons.judging.convergence import (
     of_jump,
 )
 from dropspin.comparisons.judging.judge import judge, judge_asymptotic_error, judge_order
-from dropspin.comparisons.judging.verdicts import FAILURES, Judgement
+from dropspin.comparisons.judging.verdicts import Judgement
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metric import Metric
-from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
-from dropspin.comparisons.measuring.tolerances import scale
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.tolerances import negligible
 from dropspin.comparisons.results.provenance import motion_digest
 from dropspin.comparisons.results.table import Case, Measurement
-from dropspin.comparisons.running.ablation import MOST, explaining_failure, written_out
+from dropspin.comparisons.running.ablation import MOST
 from dropspin.comparisons.running.arguments import EngineEntry
 from dropspin.comparisons.running.driving import Breakdown, divergence
 from dropspin.comparisons.running.engine_entries import engine_entry
@@ -44,8 +44,6 @@ from dropspin.scenarios.text import with_few_digits
 
 VANISHING = 0.5
 """Share of an error below which what may remain of it with finer options counts as nothing, as in an error budget."""
-TURNED = 1.0
-"""An error of the orientation above this [rad] does not grow in proportion to what causes it."""
 FEWEST_STEPS = 8
 """A run of fewer steps is not worth adding."""
 
@@ -171,25 +169,6 @@ class EngineStudy:
             if (error := judge_asymptotic_error(scene, self.claim, metric, found)) is not None:
                 yield extrapolated.measurement("asymptotic_error", name, metric.unit, error, truths[metric.kind])
 
-    def explaining_settings(self, rows: Sequence[Measurement]) -> Iterator[Measurement]:
-        """The changed settings that explain the leading, or else the largest error that fails at the finest time step, or as dt → 0."""
-        scene, engine = self.own.scene, self.entry.engine
-        measured = [row for row in rows if row.kind in ("truth", "invariant") and row.metric not in ARTEFACTS]
-        as_dt_falls = {row.metric for row in rows if row.kind == "asymptotic_error" and row.verdict in FAILURES}
-        failing = [row for row in measured if row.verdict in FAILURES] or [row for row in measured if row.metric in as_dt_falls]
-        if engine is None or engine.is_calibrated or not failing or self.own.truth is None:
-            return
-        dt = min(row.dt for row in failing)
-        sizes = {row.metric: abs(row.value) / scale(scene, row.unit) for row in failing if row.dt == dt}
-        turned = {name for name, size in sizes.items() if METRICS[name].unit == "rad" and size > TURNED}
-        metric = METRICS[max(sizes, key=lambda name: (name not in turned, name == leading_metric(scene), sizes[name]))]
-        options = self.processes.call(self.entry, written_out, scene, dt)
-        if isinstance(options, Breakdown):
-            return
-        case = Case(scene.name, self.entry.label, dt, scene.steps(dt))
-        for settings, share in explaining_failure(engine, options, self.error_of(metric, dt)).items():
-            yield case.measurement("setting", metric.name, "1", Judgement(share, "measured"), settings)
-
     def error_of(self, metric: Metric, dt: float) -> Callable[[Engine], float]:
         """A function of the engine with other options: its error at a time step [s], from few starts; NaN if it has none."""
         phases = phases_at(self.own._replace(quick=True), dt)
@@ -232,7 +211,7 @@ class EngineStudy:
                             its error at its largest value, which looks like an error that no time step removes. Its result counts if
                             it refutes the model error: `is_refuted`
             4. refined      an error that does not vanish with the time step alone, but together with the options that set the accuracy of
-                            the engine, is attributed to these options
+                            the engine, is attributed to these options, if they change it at all
             5. calibrated   a model error is a setting error if the engine with calibrated settings has none, or less than half of it
             6. jumping      a metric that jumps from flight to flight may stay at a value while the error that causes it falls: `of_jump`
 
@@ -285,7 +264,13 @@ class EngineStudy:
         values = [", ".join(with_few_digits(finer.option(option)) for _, finer in refined) for option in options]
         path = f"{'; '.join(values)}, with dt = {', '.join(f'{dt:g}' for dt, _ in refined)} s"
         points = self._points(metric, [(dt, engine_entry(finer)) for dt, finer in refined])
-        budget = replace(found.budget, cause="unresolved", reason=f"too few usable time steps with finer {names}")
+        plain = {point.dt: point for point in self.series[metric.name]}
+        least = max(VANISHING * abs(found.budget.asymptotic_error), negligible(self.own.scene, metric.unit))
+        if not any(abs(point.average.value - plain[point.dt].average.value) > least for point in points if point.dt in plain):
+            return found  # the options change too little to be the cause
+        lower, upper = min(found.budget.lower, 0.0), max(found.budget.upper, 0.0)
+        few = f"too few usable time steps with finer {names}"
+        budget = replace(found.budget, cause="unresolved", lower=lower, upper=upper, reason=few)
         if len(points) == len(refined):
             finest = convergence(self.own.scene, self.claim._replace(order=None), metric, points).budget
             if not math.isnan(finest.asymptotic_error):

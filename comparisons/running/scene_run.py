@@ -9,14 +9,18 @@ from typing import Any
 
 from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.judging.agreement import judge_agreement
+from dropspin.comparisons.judging.convergence import ARTEFACTS
 from dropspin.comparisons.judging.error_budget import is_sufficient
-from dropspin.comparisons.judging.verdicts import Judgement
+from dropspin.comparisons.judging.verdicts import FAILURES, Judgement
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
+from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
 from dropspin.comparisons.results.results import Results, TrajectoryKey
-from dropspin.comparisons.results.table import Measurement, as_table
+from dropspin.comparisons.results.table import Case, Measurement, as_table
+from dropspin.comparisons.running.ablation import explaining_failure, written_out
 from dropspin.comparisons.running.arguments import EngineEntry
+from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.engine_study import EngineStudy, Outcome
 from dropspin.comparisons.running.ensembles import judge_differences, judge_means
 from dropspin.comparisons.running.processes import EngineProcesses
@@ -28,6 +32,9 @@ from dropspin.scenarios.truths import other_laws
 
 Compared = tuple[Outcome, Sequence[Comparison]]
 """What an engine gave at a time step, and its motions from all start phases compared with the exact ones."""
+
+TURNED = 1.0
+"""An error of the orientation above this [rad] does not grow in proportion to what causes it."""
 
 
 def run_scene(
@@ -58,7 +65,7 @@ def run_scene(
     for study in studies:
         study.calibrated = by_label.get(calibrated_label(study.entry.label) or "")
         rows = list(study.rows(is_extrapolated=is_sufficient(sorted(dts))))
-        judged += [*rows, *study.explaining_settings(rows)]
+        judged += [*rows, *_explaining_settings(study, rows)]
     return _results(studies, [*judged, *distances], agreements, stamp)
 
 
@@ -104,6 +111,26 @@ def _distances_to_other_laws(
         for law, of_law in laws.items():
             value = metric.value_or_nan(compare([case.motion for case in cases], of_law))
             yield outcome.case.measurement("other_law", metric.name, metric.unit, Judgement(value, "measured"), law)
+
+
+def _explaining_settings(study: EngineStudy, rows: Sequence[Measurement]) -> Iterator[Measurement]:
+    """The changed settings that explain the leading, or else the largest error that fails at the finest time step, or as dt → 0."""
+    scene, engine = study.own.scene, study.entry.engine
+    measured = [row for row in rows if row.kind in ("truth", "invariant") and row.metric not in ARTEFACTS]
+    as_dt_falls = {row.metric for row in rows if row.kind == "asymptotic_error" and row.verdict in FAILURES}
+    failing = [row for row in measured if row.verdict in FAILURES] or [row for row in measured if row.metric in as_dt_falls]
+    if engine is None or engine.is_calibrated or not failing or study.own.truth is None:
+        return
+    dt = min(row.dt for row in failing)
+    sizes = {row.metric: abs(row.value) / scale(scene, row.unit) for row in failing if row.dt == dt}
+    turned = {name for name, size in sizes.items() if METRICS[name].unit == "rad" and size > TURNED}
+    metric = METRICS[max(sizes, key=lambda name: (name not in turned, name == leading_metric(scene), sizes[name]))]
+    options = study.processes.call(study.entry, written_out, scene, dt)
+    if isinstance(options, Breakdown):
+        return
+    case = Case(scene.name, study.entry.label, dt, scene.steps(dt))
+    for settings, share in explaining_failure(engine, options, study.error_of(metric, dt)).items():
+        yield case.measurement("setting", metric.name, "1", Judgement(share, "measured"), settings)
 
 
 def _results(

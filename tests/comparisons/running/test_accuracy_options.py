@@ -1,11 +1,14 @@
 """Engines whose accuracy is not set by the time step alone raise no alarm, and their faults do."""
 
 import math
+from typing import ClassVar
 
 import pytest
 from support.accuracy_options import Adaptive, InnerStep, Substeps
+from support.sampled import Sampled
 
 from dropspin.comparisons.conformance.checks import conform
+from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.options import NumericOption
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.running.run import run
@@ -54,6 +57,69 @@ def test_cause_is_the_accuracy_option():
     steps = "0.00416667, 0.00208333, 0.00104167, with dt = 0.004, 0.002, 0.001 s"
     assert row["reason"] == f"falls with finer inner_step; up to 0.0049 may remain ({steps})"
     assert row["lower"] <= 0.0 <= row["upper"]
+
+
+class Planted(Engine):
+    """The exact motion beside an error of the position that is known: a function of the time step and of the option, over 1 m."""
+
+    name = "planted"
+    numbers: ClassVar = {"tol": NumericOption(1e-3, 0.0, 1.0)}
+    levels = (1e-3, 1e-4, 1e-5, 1e-6)
+
+    @property
+    def accuracy(self):
+        return {"tol": self.levels}
+
+    def error(self, dt, tol):
+        return 0.05 + 2.0 * dt
+
+    def prepare(self, scene, dt):
+        error = self.error(dt, float(self.option("tol")))
+
+        def distorted(rows, times, dt, truth):
+            rows[:, 0] += error * times / scene.duration
+            return rows
+
+        return Sampled(scene, dt, scene, distorted)
+
+
+class OfOption(Planted):
+    def error(self, dt, tol):
+        return 20.0 * tol + 2.0 * dt
+
+
+class Kinked(Planted):
+    def error(self, dt, tol):
+        return 500.0 * dt**2 if dt < 5e-3 else 0.012
+
+
+class OfThree(Planted):
+    levels = (1e-3, 1e-5, 1e-7)
+
+
+class BreaksDown(Planted):
+    def error(self, dt, tol):
+        return super().error(dt, tol) / float(tol > 2e-6)
+
+
+FIVE, FOUR = (0.016, 0.008, 0.004, 0.002, 0.001), (0.004, 0.003, 0.002, 0.001)
+
+
+@pytest.mark.parametrize(
+    ("engine", "dts", "cause"),
+    [
+        (OfOption, FIVE, "tol"),
+        (Planted, FIVE, "model"),
+        (OfThree, FOUR, "model"),  # the three finest steps span a factor of 3, too little to extrapolate with finer options
+        (BreaksDown, FIVE, "model"),
+        (Kinked, FIVE, "unresolved"),  # the finest steps alone would give an error that vanishes
+    ],
+)
+def test_option_that_changes_nothing_is_no_cause(engine, dts, cause):
+    table = run("fall-spin", engine(), dts).table
+    [row] = table[(table["kind"] == "asymptotic_error") & (table["metric"] == "position_error")].to_dict("records")
+    assert row["cause"] == cause
+    assert (row["verdict"] == "failed") == (cause == "model")
 
 
 def test_refinement_too_coarse_to_be_compared_leaves_the_cause_open():

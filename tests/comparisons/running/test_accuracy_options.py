@@ -88,13 +88,13 @@ class OfOption(Planted):
         return 20.0 * tol + 2.0 * dt
 
 
-class Kinked(Planted):
-    def error(self, dt, tol):
-        return 500.0 * dt**2 if dt < 5e-3 else 0.012
-
-
 class OfThree(Planted):
     levels = (1e-3, 1e-5, 1e-7)
+
+
+class Kinked(OfThree):
+    def error(self, dt, tol):
+        return 500.0 * dt**2 if dt < 5e-3 else 0.012
 
 
 class BreaksDown(Planted):

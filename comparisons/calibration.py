@@ -153,7 +153,8 @@ def measurements(motion: Motion, dt: float) -> list[Measured]:
     rests = float(np.ptp(low)) < 0.1 * LOW_DROP
     if not rests:
         low, slow = np.full_like(low, np.nan), np.full_like(slow, np.nan)
-    steady = np.linspace(low[0], low[-1], len(low))
+    times = dt * np.arange(len(low))
+    line = np.polyfit(times, low, 1) if rests else np.full(2, np.nan)  # a single position may be anywhere in the jitter
     half, _, _ = _bounces(motion, dt / 2.0)
     at_impact = f"over {START_PHASES} drops from {DROP:g} m, whose impacts are spread evenly within a time step"
     at_rest = f"dropped from {1e3 * LOW_DROP:g} mm, in the fifth second" if rests else "the body does not come to rest within 5 s"
@@ -165,8 +166,13 @@ def measurements(motion: Motion, dt: float) -> list[Measured]:
         Measured("restitution by height", float(heights.mean()), "1", "√(rebound height / drop height), mean over these drops"),
         Measured("penetration", deepest, "m", f"largest of these drops; at impact the body falls {IMPACT * dt:.3g} m in one step"),
         Measured("depth at rest", float(-low.mean()), "m", at_rest),
-        Measured("sinking at rest", float(low[0] - low[-1]) / WATCHED, "m/s", f"mean speed downwards, {at_rest}"),
-        Measured("jitter at rest", float(np.ptp(low - steady)), "m", f"highest minus lowest position beside this motion, {at_rest}"),
+        Measured("sinking at rest", -float(line[0]), "m/s", f"mean speed downwards, {at_rest}"),
+        Measured(
+            "jitter at rest",
+            float(np.ptp(low - np.polyval(line, times))),
+            "m",
+            f"highest minus lowest position beside this motion, {at_rest}",
+        ),
         Measured("speed at rest", float(np.abs(slow).max()), "m/s", f"greatest, {at_rest}"),
         Measured("restitution at half the step", float(half.mean()), "1", "with the same settings, which may be valid for one step only"),
         Measured("largest stable step", step, "s", how),

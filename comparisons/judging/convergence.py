@@ -95,6 +95,7 @@ class Convergence:
         is_open: Whether more time steps may decide the cause.
         remark: Which time steps or options were added to the requested ones.
         finest_error: The error at the finest time step; NaN if it is not resolved, or if there are too few time steps.
+        largest_error: The size of the largest error at these time steps; NaN if there are too few.
     """
 
     budget: ErrorBudget
@@ -103,6 +104,7 @@ class Convergence:
     is_open: bool = False
     remark: str = ""
     finest_error: float = math.nan
+    largest_error: float = math.nan
 
 
 def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint], remark: str = "") -> Convergence:
@@ -142,8 +144,8 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
         order_tolerance = float(np.sum(np.abs(logs) * shares) / np.sum(logs**2))
     deciding = budget if vector is None or budget.cause != "discretisation" else vector
     is_open = deciding.cause == "unresolved" and has_value and float(np.nanmax(np.abs(errors))) > floor
-    finest_error = series[at].average.value if is_sufficient(list(dts)) else math.nan
-    return Convergence(budget, series[at].dt, order_tolerance, is_open, remark, finest_error)
+    sizes = (series[at].average.value, float(np.nanmax([abs(point.average.value) for point in series], initial=0.0)))
+    return Convergence(budget, series[at].dt, order_tolerance, is_open, remark, *(sizes if is_sufficient(list(dts)) else ()))
 
 
 def beside_recording(result: Convergence, uncertainty: float) -> Convergence:

@@ -10,6 +10,7 @@ import numpy as np
 
 from dropspin.comparisons.judging.convergence import JUMPING, Claim, Convergence, SeriesPoint
 from dropspin.comparisons.judging.expectations import bounds_of, compared_with_expectations, matching_expectations, narrowest
+from dropspin.comparisons.judging.extrapolation import ORDERS
 from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY, Judgement, Verdict
 from dropspin.comparisons.measuring.comparison import BeyondHorizon
 from dropspin.comparisons.measuring.metric import Metric
@@ -82,7 +83,7 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, conver
     The difference from a recording that remains is `measured`.
 
     A model error or a setting error is `known` if an expectation for this engine at its finest time step allows values of its interval,
-    `limited` if a known limitation explains an error as small as the nearer end of the interval, or as that at the finest time step, and
+    `limited` if a known limitation explains an error as small as the nearer end of the interval, or as the largest at a time step, and
     fails otherwise. An unresolved one is `measured`. A vanishing error passes, also where a known fault is expected at a time step: whether
     that fault occurs is judged there.
     """
@@ -98,7 +99,7 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, conver
         if bounds and all(budget.lower <= upper and budget.upper >= lower for lower, upper in bounds):
             verdict, reason = "known", "; ".join(expected.reason for expected in allowing)
         else:
-            explained = _explained(claim, metric, np.fmin(max(budget.lower, -budget.upper), abs(convergence.finest_error)))
+            explained = _explained(claim, metric, np.fmin(max(budget.lower, -budget.upper), convergence.largest_error))
             verdict, reason = "limited" if explained else "failed", joined(*explained, f"{reason}; no time step removes it")
     reason += f" ({convergence.remark})" if convergence.remark else ""
     if verdict == "failed" and budget.cause == "setting":
@@ -114,7 +115,9 @@ def judge_order(claim: Claim, metric: Metric, convergence: Convergence) -> Judge
     claimed = claim.order if budget.cause == "discretisation" else None
     if metric.name in JUMPING or (math.isnan(budget.order) and claimed != math.inf):
         return None
-    verdict: Verdict = "measured" if claimed is None else "passed" if budget.order_upper >= claimed else "failed"
+    verdict: Verdict = "measured"
+    if claimed is not None:  # no order above the last of `ORDERS` is fitted; an exact engine has none
+        verdict = "passed" if budget.order_upper >= (claimed if claimed == math.inf else min(claimed, ORDERS[-1])) else "failed"
     steps = ", ".join(f"{dt:g}" for dt in budget.dts)
     claim_text = "" if claimed is None else f"; claimed {'exactness' if claimed == math.inf else f'{claimed:g}'}"
     reason = f"fitted at {steps} s{claim_text}" if steps else f"{budget.reason}{claim_text}"

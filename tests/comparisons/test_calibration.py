@@ -238,6 +238,25 @@ def test_sinking_on_a_damper_is_told_from_jitter():
     assert value(found, "jitter at rest") < 1e-12
 
 
+@pytest.mark.usefixtures("without_step_search")
+def test_sinking_is_that_of_a_line_through_all_positions():
+    """Of a body that sinks by 1e-4 m/s with a jitter of 5e-4 m, which two positions alone would tell wrongly by as much."""
+
+    def motion(drop, steps, dt):
+        times = dt * np.arange(steps + 1)
+        if drop == calibration.LOW_DROP:
+            heights = -1e-4 * times - 2.5e-4 * np.cos(1.001 * np.pi * np.arange(steps + 1))
+            return list(heights), list(np.zeros(steps + 1))
+        impact = math.sqrt(2.0 * drop / 9.81)
+        falls, after = times < impact, times - impact
+        heights = np.where(falls, drop - 0.5 * 9.81 * times**2, 0.5 * 9.81 * impact * after - 0.5 * 9.81 * after**2)
+        return list(heights), list(np.where(falls, -9.81 * times, 0.5 * 9.81 * impact - 9.81 * after))
+
+    found = {one.name: one.value for one in calibration.measurements(motion, 2e-3)}
+    assert found["sinking at rest"] == pytest.approx(1e-4, rel=0.05)
+    assert found["jitter at rest"] == pytest.approx(5e-4, rel=0.01)
+
+
 @pytest.mark.parametrize(
     ("name", "given", "message"),
     [

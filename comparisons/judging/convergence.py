@@ -159,7 +159,7 @@ def beside_recording(result: Convergence, uncertainty: float) -> Convergence:
     cause, reason = "unresolved", f"finer time steps are needed to tell it from the uncertainty of the recording, {uncertainty:.2g}"
     if lower > 0.0:
         cause, reason = COMBINED, f"remains as dt → 0; the uncertainty of the recording is {uncertainty:.2g}"
-    elif budget.asymptotic_error <= uncertainty:
+    elif (budget.upper if budget.cause == "unresolved" else budget.asymptotic_error) <= uncertainty:
         cause, reason = WITHIN_UNCERTAINTY, f"within the uncertainty of the recording, {uncertainty:.2g}"
     elif math.isnan(budget.asymptotic_error) or budget.cause == "unresolved":
         reason = budget.reason

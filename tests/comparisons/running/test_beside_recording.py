@@ -122,15 +122,17 @@ def test_motion_of_ones_own_is_measured_beside_the_first_toss():
 
 
 @pytest.mark.parametrize(
-    ("lower", "upper", "value", "cause"),
+    ("before", "lower", "upper", "value", "cause"),
     [
-        (0.010, 0.020, 0.015, "model, setting or start"),
-        (0.004, 0.009, 0.004, "within uncertainty"),
-        (0.002, 0.020, 0.015, "unresolved"),
+        ("model", 0.010, 0.020, 0.015, "model, setting or start"),
+        ("model", 0.004, 0.009, 0.004, "within uncertainty"),
+        ("model", 0.002, 0.020, 0.015, "unresolved"),
+        ("unresolved", 0.0, 0.034, 0.003, "unresolved"),  # the estimate of so few time steps says nothing
+        ("unresolved", 0.0, 0.004, 0.003, "within uncertainty"),
     ],
 )
-def test_interval_of_the_remaining_difference_contains_the_uncertainty(lower, upper, value, cause):
-    found = beside_recording(Convergence(ErrorBudget("model", "approaches", value, lower, upper, 1.0), 1e-3), 0.005)
+def test_interval_of_the_remaining_difference_contains_the_uncertainty(before, lower, upper, value, cause):
+    found = beside_recording(Convergence(ErrorBudget(before, "approaches", value, lower, upper, 1.0), 1e-3), 0.005)
     assert found.budget.cause == cause
     assert (found.budget.lower, found.budget.upper) == pytest.approx((max(lower - 0.005, 0.0), upper + 0.005))
     assert np.isnan(found.budget.order)

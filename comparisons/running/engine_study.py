@@ -211,7 +211,7 @@ class EngineStudy:
                             its error at its largest value, which looks like an error that no time step removes. Its result counts if
                             it refutes the model error: `is_refuted`
             4. refined      an error that does not vanish with the time step alone, but together with the options that set the accuracy of
-                            the engine, is attributed to these options, if they change it at all
+                            the engine, is attributed to these options, if they change it by more than half of it
             5. calibrated   a model error is a setting error if the engine with calibrated settings has none, or less than half of it
             6. jumping      a metric that jumps from flight to flight may stay at a value while the error that causes it falls: `of_jump`
 
@@ -264,10 +264,12 @@ class EngineStudy:
         values = [", ".join(with_few_digits(finer.option(option)) for _, finer in refined) for option in options]
         path = f"{'; '.join(values)}, with dt = {', '.join(f'{dt:g}' for dt, _ in refined)} s"
         points = self._points(metric, [(dt, engine_entry(finer)) for dt, finer in refined])
-        plain = {point.dt: point for point in self.series[metric.name]}
+        plain = {point.dt: point.average.value for point in self.series[metric.name]}
+        others = {dt for dt, finer in refined if finer.label != self.entry.label}
+        changes = [abs(point.average.value) - abs(plain[point.dt]) for point in points if point.dt in others & plain.keys()]
         least = max(VANISHING * abs(found.budget.asymptotic_error), negligible(self.own.scene, metric.unit))
-        if not any(abs(point.average.value - plain[point.dt].average.value) > least for point in points if point.dt in plain):
-            return found  # the options change too little to be the cause
+        if not changes or not abs(changes[-1]) > least:  # between the finest options and those of the engine, or those next to these
+            return found
         lower, upper = min(found.budget.lower, 0.0), max(found.budget.upper, 0.0)
         few = f"too few usable time steps with finer {names}"
         budget = replace(found.budget, cause="unresolved", lower=lower, upper=upper, reason=few)

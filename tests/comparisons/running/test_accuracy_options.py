@@ -97,6 +97,15 @@ class Kinked(OfThree):
         return 500.0 * dt**2 if dt < 5e-3 else 0.012
 
 
+class FinestByDefault(OfThree):
+    """The coarser values of the option make an error that falls as steeply as none of the time step does."""
+
+    numbers: ClassVar = {"tol": NumericOption(1e-7, 0.0, 1.0)}
+
+    def error(self, dt, tol):
+        return 0.0043 + 20.0 * tol + 0.5 * dt
+
+
 class BreaksDown(Planted):
     def error(self, dt, tol):
         return super().error(dt, tol) / float(tol > 2e-6)
@@ -112,6 +121,7 @@ FIVE, FOUR = (0.016, 0.008, 0.004, 0.002, 0.001), (0.004, 0.003, 0.002, 0.001)
         (Planted, FIVE, "model"),
         (OfThree, FOUR, "model"),  # the three finest steps span a factor of 3, too little to extrapolate with finer options
         (BreaksDown, FIVE, "model"),
+        (FinestByDefault, FIVE, "model"),
         (Kinked, FIVE, "unresolved"),  # the finest steps alone would give an error that vanishes
     ],
 )

@@ -44,7 +44,10 @@ AGAINST = "friction has the wrong sign: it acts along the slip of the contact po
 IN_FRICTION = f"{SQUARE}: in friction, whose impulse is at most µ times that of the normal force, along the slip over its length"
 IN_NORMAL = f"{SQUARE}: the separation speed is e times the approach speed"
 REVERSED = "friction has the wrong sign: it reverses the slip of the contact point, and has to reduce it"
-BEYOND = "friction has no limit: it reverses the slip of the contact point, because the factor 1 - µ (1 + e) |u_n|/|u_t| may be negative"
+BEYOND = (
+    "friction has no upper limit: it reverses the slip of the contact point, which it may at most stop; with the factor "
+    "1 - µ (1 + e) |u_n|/|u_t| of the slip, this factor must not be negative"
+)
 INTO_FLOOR = "restitution has the wrong sign: the contact point goes on into the floor"
 OF_REBOUND = (IN_NORMAL, INTO_FLOOR)
 AT_START = "the inertia is rotated by the orientation at the start: in the world frame it is R I Rᵀ with the R of the impact"
@@ -198,6 +201,9 @@ def _impulses(contact: Contact, response: Array) -> Iterator[tuple[str, Array]]:
     for against in {share, limit} - {np.inf}:
         yield AGAINST, by_slip(rebound, -against)
     if np.isfinite(friction):
+        normal = (rebound - u_n) / float(response[1, 1])
+        if friction * normal > grip:
+            yield BEYOND, normal * UP - friction * normal * along
         yield AGAINST, by_force(rebound, -1.0)
         for factor in (speed, 1.0 / slip, speed / slip, slip):
             yield IN_FRICTION, by_slip(rebound, min(factor * limit, 1.0))

@@ -171,11 +171,13 @@ class Configured:
         """Options without the settings that have no effect beside the others."""
         needs = {name: self.settings[name].needs if name in self.settings else () for name in options}
         is_met = {need: options.get(need[0], self._default(need[0])) in need[1:] for of_one in needs.values() for need in of_one}
-        return {name: text for name, text in options.items() if all(is_met[need] for need in needs[name])}
+        left = {name: text for name, text in options.items() if all(is_met[need] for need in needs[name])}
+        return left if len(left) == len(options) else self.acting(left)  # which others may need
 
     def allows(self, name: str, value: str) -> bool:
-        """Whether a text is an allowed value of a setting, or of an option in `choices`."""
-        return self.settings[name].parsed(value) is not None if name in self.settings else value in self.choices[name]
+        """Whether a text is a value of a setting, one of its words if it has words, or of an option in `choices`."""
+        words = self.choices[name] if name in self.choices else self.settings[name].values
+        return value in words if words else self.settings[name].parsed(value) is not None
 
     @property
     def label(self) -> str:

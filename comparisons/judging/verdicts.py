@@ -29,10 +29,20 @@ MARKS: dict[str, str] = dict(zip(VERDICTS, "✗✗⏱∞✗?–†!·✓·", str
 """Verdicts as one character."""
 FAILURES = frozenset({"failed"})
 BREAKDOWNS = frozenset({"broken", "diverged", "crashed", "timed_out"})
-Basis = Literal["", "fault_absent", "few_starts", "uncertain_recording", "same_method", "accepted_failure", "scene_changed", "not_repeated"]
+Basis = Literal[
+    "",
+    "fault_absent",
+    "few_starts",
+    "uncertain_recording",
+    "same_method",
+    "accepted_failure",
+    "scene_changed",
+    "not_repeated",
+    "since_accepted",
+]
 """What a verdict is based on, beside value and bounds: the known fault that is expected does not occur; the few starts of a quick run do
 not decide it, or the uncertainty of the recording does not; two engines agree because they use the same discretisation; a failure was
-accepted; the scene is not the accepted one; the engine does not repeat its own motion."""
+accepted; the scene is not the accepted one; the engine does not repeat its own motion; a share is of the change since acceptance."""
 WITHIN_UNCERTAINTY, COMBINED = "within uncertainty", "model, setting or start"
 """Causes of a difference from a recording: the recording does not tell it from 0; what contributes to it is not known."""
 Cause = str

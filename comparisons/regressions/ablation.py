@@ -66,4 +66,6 @@ def _rows(changed: "pd.Series[Any]", results: Results, baseline: Baseline, impor
         error_of = EngineStudy(StartPhase(scene, truth_for(scene)), entry, processes, ignore).error_of(metric, dt)
         change = changed["value"] - changed["before"]
         for names, share in explaining(entry.adapter, back, error_of, change).items():
-            yield Case(scene.name, label, dt).measurement("setting", metric.name, "1", Judgement(share, "measured"), names)
+            yield Case(scene.name, label, dt).measurement(
+                "setting", metric.name, "1", Judgement(share, "measured", basis="since_accepted"), names
+            )

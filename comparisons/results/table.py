@@ -54,7 +54,7 @@ class Measurement:
         unit: SI unit; '1' for a ratio.
         kind: What the value is compared with.
         truth: Name of the exact solution, or `measured` for a recording. If `kind` is `agreement`, the label of the other engine; if it is
-            `other_law`, the impact law; if it is `setting`, the settings whose share of the error is the value.
+            `other_law`, the impact law; if it is `setting`, the settings whose share is the value.
         lower: Smallest allowed value, or the lower end of the 95 % interval of an order or an asymptotic error; NaN if there is neither.
         upper: Largest allowed value, or the upper end of the 95 % interval; NaN if there is neither.
         tolerance: The change of the value between two runs up to which it counts as unchanged, in `unit`; NaN if it is not compared.

@@ -128,14 +128,20 @@ def explaining_failure(engine: Engine, options: Mapping[str, str], error_of: Cal
         The shares; before them, by `ALL_SETTINGS`, the share of the error that calibrated settings take away, unless it is about all and
         there are shares.
     """
-    written = replace(engine, options=options)
-    changed = [name for name in options if name not in written.calibrated.options]
-    error, calibrated = error_of(written), error_of(written.calibrated)
-    if not changed or not abs(calibrated) < MOST * abs(error):
+    calibrated = engine.calibrated
+    if options.keys() <= calibrated.options.keys():
         return {}
-    if not abs(error - error_of(engine)) <= (1.0 - ENOUGH) * abs(error):
-        return {}  # settings that have no option, or that are not reported, err too
-    found, removed = explaining(written, dict.fromkeys(changed), error_of, partly=True), 1.0 - calibrated / error
+    error, remaining = error_of(engine), error_of(calibrated)
+    if not abs(remaining) < MOST * abs(error):
+        return {}
+    written = replace(engine, options=options)
+    # Those that the engine itself has no option for count only if they matter: others may act once a setting is reverted.
+    without = written.without([name for name in options if name in engine.settings and engine.unmet_need(name) is not None])
+    alike = next((one for one in (without, written) if abs(error_of(one) - error) <= (1.0 - ENOUGH) * abs(error)), None)
+    if alike is None:  # settings that have no option, or that are not reported, err too
+        return {}
+    changed = [name for name in alike.options if name not in calibrated.options]
+    found, removed = explaining(alike, dict.fromkeys(changed), error_of, partly=True), 1.0 - remaining / error
     return found if found and abs(1.0 - removed) <= 1.0 - ENOUGH else {ALL_SETTINGS: removed, **found}
 
 

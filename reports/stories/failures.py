@@ -126,20 +126,25 @@ def _consistent_with(results: Results, engine: str) -> list[str]:
     return [f"Possible cause of the asymptotic errors of {engine}: {listed_causes}."] if listed_causes else []
 
 
-NONE_ALONE = "no single setting explains half of this, and no two explain 90 %"
+NONE_ALONE = "resetting one or two of them does not take away 90 % of this"
+OTHER_SIGN = 1.1
+"""Share of an error, taken away, from which an error of the other sign is left."""
 
 
 def settings_that_explain(results: Results, engine: str) -> Iterator[str]:
     """A sentence for each error that changed settings of an engine explain; scenes with the same settings share a sentence."""
     mine = results.table[(results.table["kind"] == "setting") & (results.table["engine"] == engine)].to_dict("records")
-    by_scene = grouped(mine, itemgetter("scene", "metric", "dt"))
-    alike = grouped(by_scene.items(), lambda item: (item[0][1], *(row["truth"] for row in item[1])))
-    for ((scene, metric, dt), rows), *others in alike.values():
+    by_scene = grouped(mine, itemgetter("scene", "metric", "dt", "basis"))
+    names = {of_scene: [row["truth"] for row in rows] for of_scene, rows in by_scene.items()}
+    # What calibrated settings take away differs from scene to scene.
+    alike = grouped(by_scene.items(), lambda item: (*item[0][1::2], *names[item[0]], item[0][0] * (ALL_SETTINGS in names[item[0]])))
+    for ((scene, metric, dt, basis), rows), *others in alike.values():
         also = f"; the same settings explain it in {listed([where for (where, *_), _ in others])}" if others else ""
-        found, error = {row["truth"]: row["value"] for row in rows}, f"of the {subject(metric, 'truth', '')} at {in_ms(dt)}"
+        change = "change of the " if basis == "since_accepted" else ""
+        found, error = {row["truth"]: row["value"] for row in rows}, f"of the {change}{subject(metric, 'truth', '')} at {in_ms(dt)}"
         removed, of_this = found.pop(ALL_SETTINGS, None), ""
         if removed is not None:
-            sign = ", so that an error of the other sign is left" if removed > 1.0 else ""
+            sign = ", so that an error of the other sign is left" if removed > OTHER_SIGN else ""
             of_this, error = f"calibrated settings take away {rounded(100.0 * removed, 3)} % {error}{sign}; ", "of this"
         yield f"{scene}: {of_this}{explained_by(found, error) if found else NONE_ALONE}{also}."
 

@@ -154,8 +154,11 @@ def _recommendation(study: TradeOff, tolerance: float) -> str:
         return f"{goal}: {outcome}. {tried}, because {_reason(ladder)}."
     sentence, ratio = f"{goal}: {_named(advice.best)}, {duration(advice.best.typical_cost)} per simulated second", advice.ratio
     if advice.next_best is None:
-        others = {point.engine for point in study.points} - {advice.best.engine}
-        sentence += "; no other engine that was compared reaches this tolerance." if others else "."
+        others = [point for point in study.points if point.engine != advice.best.engine]
+        reach = "reaches this tolerance"
+        if any(point.error <= tolerance for point in others):
+            reach = "is within this tolerance at a tested time step and at all smaller ones"
+        sentence += f"; no other engine that was compared {reach}." if others else "."
     elif not advice.level:
         sentence += f"; the next best, {_named(advice.next_best)}, takes {_times(ratio)} as long."
     else:

@@ -36,8 +36,8 @@ def decaying(factor, *, before=False):
     return {"wanted_normal": wanted_normal}
 
 
-def coulomb(sign=1.0, factor=lambda approach, slip: 1.0):
-    """Coulomb's law by the impulse, with a sign, and with a factor of the speeds of approach and of slip."""
+def coulomb(sign=1.0, factor=lambda approach, slip: 1.0, *, limited=True):
+    """Coulomb's law by the impulse, with a sign, with a factor of the speeds of approach and of slip, and with its limit or without."""
 
     def impulse(self, K, u, u_normal):
         slip = u - u_normal * UP
@@ -46,7 +46,7 @@ def coulomb(sign=1.0, factor=lambda approach, slip: 1.0):
         normal = -(1.0 + self.restitution) * u_normal / K[1, 1]
         sticking = speed / (along @ K @ along) if speed > 0.0 else 0.0
         sliding = self.floor.coefficient * normal * factor(-u_normal, speed) if self.floor.coefficient > 0.0 else 0.0
-        return normal * UP - sign * min(sliding, sticking) * along
+        return normal * UP - sign * (min(sliding, sticking) if limited or np.isinf(sliding) else sliding) * along
 
     return {"impulse": impulse}
 
@@ -96,7 +96,8 @@ MISTAKES = {
     "friction along the slip": (AGAINST, "impacts", {"wanted_slip": lambda self, slip, n: self.share(slip, n) * slip}),
     "friction along the slip of a ball": (AGAINST, "slippery floor", coulomb(-1.0)),
     "friction reverses the slip": (AGAINST, "impacts", {"wanted_slip": lambda self, slip, n: (self.share(slip, n) - 2.0) * slip}),
-    "friction beyond the slip": ("friction has no limit", "impacts", {"share": unlimited}),
+    "friction beyond the slip": ("friction has no upper limit", "impacts", {"share": unlimited}),
+    "friction beyond the slip, by Coulomb's law": ("friction has no upper limit", "impacts", coulomb(limited=False)),
     "squares of both speeds": (SQUARE, "impacts", {"quotient": lambda self, approach, slip: approach**2 / slip**2}),
     "square of the slip": (SQUARE, "slippery floor", {"quotient": lambda self, approach, slip: approach / slip**2}),
     "slip not over its length": (SQUARE, "impacts", coulomb(1.0, lambda approach, slip: slip)),

@@ -77,6 +77,19 @@ def test_setting_may_need_one_of_several_values_of_an_option():
     assert Solved({"solver": "mujoco", "stiffness": "2"}).without(["solver"]).options == {}
 
 
+class Chained(Configured):
+    name = "chained"
+    settings: ClassVar = {
+        "friction": Setting(0.0, "of a contact", needs=(("contact", "on"),)),
+        "contact": Setting("off", "whether there is any", values=("off", "on"), needs=(("floor", "on"),)),
+        "floor": Setting("off", "whether there is any", values=("off", "on")),
+    }
+
+
+def test_settings_that_need_each_other_are_left_out_together():
+    assert Chained({"friction": "1", "contact": "on", "floor": "on"}).without(["floor"]).options == {}
+
+
 def test_labels_have_settings_as_they_are_documented():
     assert engine("pybullet[linear_damping=.040,floor_restitution=0]").label == "pybullet[floor_restitution=0,linearDamping=0.04]"
     assert engine("mujoco[solref=-1e3 0,island=on]").label == "mujoco[island=enable,solref=-1000 0]"

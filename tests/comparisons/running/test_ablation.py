@@ -215,11 +215,32 @@ def test_settings_of_which_no_two_explain_an_error_are_stated_together():
             return replace(self, model=float(self.option("rest"))).losing(scene, dt)
 
     ball = load("drop-ball").model_copy(update={"duration": 0.8})
-    results = run(ball, [Thirds({"profile": "default"})], [1e-3], quick=True)
-    found = results.table[results.table["kind"] == "setting"].set_index("truth")["value"].to_dict()
-    assert found == {"profile=calibrated": pytest.approx(1.0, abs=0.01)}
-    [sentence] = settings_of(results, "losing[profile=default]")
-    assert sentence.endswith("of the bounce height error at 1 ms; no single setting explains half of this, and no two explain 90 %.")
+    results = run([ball, ball.model_copy(update={"name": "again"})], [Thirds({"profile": "default"})], [1e-3], quick=True)
+    found = results.table[results.table["kind"] == "setting"]
+    assert list(zip(found["scene"], found["truth"], strict=True)) == [(name, "profile=calibrated") for name in ("drop-ball", "again")]
+    assert list(found["value"]) == pytest.approx([1.0, 1.0], abs=0.01)
+    assert list(settings_of(results, "losing[profile=default]")) == [
+        f"{name}: calibrated settings take away 100 % of the bounce height error at 1 ms; resetting one or two of them does not take away "
+        "90 % of this."
+        for name in ("drop-ball", "again")
+    ]
+
+
+def test_option_that_a_default_profile_changes_is_reset_too():
+    """An adapter may take another of the values of an option by default."""
+
+    class Choosing(Losing):
+        choices: ClassVar = {"profile": ("calibrated", "default"), "solver": ("exact", "rough")}
+
+        def option(self, name):
+            return "rough" if name == "solver" and self.is_default else super().option(name)
+
+        def prepare(self, scene, dt):
+            return replace(self, model=0.04 * (self.option("solver") == "rough")).losing(scene, dt)
+
+    ball = load("drop-ball").model_copy(update={"duration": 0.8})
+    found = run(ball, [Choosing({"profile": "default"})], [1e-3], quick=True).table.query("kind == 'setting'")
+    assert dict(zip(found["truth"], found["value"], strict=True)) == {"soft=0.05, solver=rough": pytest.approx(0.945, abs=0.01)}
 
 
 def test_settings_that_make_less_than_half_of_an_error_are_not_its_cause():
@@ -253,6 +274,13 @@ def test_friction_in_the_direction_of_slip_is_a_setting_of_mujoco():
     found = table[table["kind"] == "setting"]
     assert found[["metric", "truth"]].to_dict("split")["data"] == [["position_error", "solreffriction=0 0"]]
     assert list(found["value"]) == pytest.approx([1.0], abs=1e-3)
+
+
+@pytest.mark.extended
+def test_setting_that_acts_only_once_others_are_reset_is_left_out():
+    """With `override`, contact pairs have no friction of their own: then it has no effect, and it is not among what is reset."""
+    table = run("drop-ball-backspin", ["mujoco[profile=default,override=enable]"], [1e-3], quick=True).table
+    assert list(table[table["kind"] == "setting"]["truth"]) == ["cone=pyramidal, override=enable"]
 
 
 def test_undefined_error_has_no_share():

@@ -106,6 +106,13 @@ class FinestByDefault(OfThree):
         return 0.0043 + 20.0 * tol + 0.5 * dt
 
 
+class HalfOfOption(Planted):
+    """The finest value takes half of the error away; what remains with still finer ones is not known."""
+
+    def error(self, dt, tol):
+        return 0.025 * (1.0 + math.log10(tol / 1e-6) / 3.0) + 2.0 * dt
+
+
 class BreaksDown(Planted):
     def error(self, dt, tol):
         return super().error(dt, tol) / float(tol > 2e-6)
@@ -122,6 +129,7 @@ FIVE, FOUR = (0.016, 0.008, 0.004, 0.002, 0.001), (0.004, 0.003, 0.002, 0.001)
         (OfThree, FOUR, "model"),  # the three finest steps span a factor of 3, too little to extrapolate with finer options
         (BreaksDown, FIVE, "model"),
         (FinestByDefault, FIVE, "model"),
+        (HalfOfOption, FIVE, "unresolved"),
         (Kinked, FIVE, "unresolved"),  # the finest steps alone would give an error that vanishes
     ],
 )

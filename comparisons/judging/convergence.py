@@ -144,8 +144,9 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
         order_tolerance = float(np.sum(np.abs(logs) * shares) / np.sum(logs**2))
     deciding = budget if vector is None or budget.cause != "discretisation" else vector
     is_open = deciding.cause == "unresolved" and has_value and float(np.nanmax(np.abs(errors))) > floor
-    sizes = (series[at].average.value, float(np.nanmax([abs(point.average.value) for point in series], initial=0.0)))
-    return Convergence(budget, series[at].dt, order_tolerance, is_open, remark, *(sizes if is_sufficient(list(dts)) else ()))
+    largest = max((abs(point.average.value) for point in series if math.isfinite(point.average.value)), default=math.nan)
+    sizes = (series[at].average.value, largest) if is_sufficient(list(dts)) else ()
+    return Convergence(budget, series[at].dt, order_tolerance, is_open, remark, *sizes)
 
 
 def beside_recording(result: Convergence, uncertainty: float) -> Convergence:

@@ -18,6 +18,8 @@ from dropspin.comparisons.measuring.tolerances import negligible
 from dropspin.scenarios import Scenario, Truth
 
 OF_BOUND = "reason of the bound: "
+NEAR_ORDER = 0.25
+"""How far a fitted order above those of the intervals may be below the claimed one: half the distance of two orders there."""
 """Before the reason of an expectation that fails: what the bound allows for, which need not be what is wrong."""
 
 
@@ -83,7 +85,7 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, conver
     The difference from a recording that remains is `measured`.
 
     A model error or a setting error is `known` if an expectation for this engine at its finest time step allows values of its interval,
-    `limited` if a known limitation explains an error as small as the nearer end of the interval, or as the largest at a time step, and
+    `limited` if a known limitation explains an error as small as the nearer end of a narrow interval, or as the largest at a time step, and
     fails otherwise. An unresolved one is `measured`. A vanishing error passes, also where a known fault is expected at a time step: whether
     that fault occurs is judged there.
     """
@@ -99,7 +101,9 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, conver
         if bounds and all(budget.lower <= upper and budget.upper >= lower for lower, upper in bounds):
             verdict, reason = "known", "; ".join(expected.reason for expected in allowing)
         else:
-            explained = _explained(claim, metric, np.fmin(max(budget.lower, -budget.upper), convergence.largest_error))
+            nearest, estimate = max(budget.lower, -budget.upper), abs(budget.asymptotic_error)
+            least = nearest if nearest >= 0.5 * estimate else estimate  # the end of a wide interval says nothing of the size
+            explained = _explained(claim, metric, np.fmin(least, convergence.largest_error))
             verdict, reason = "limited" if explained else "failed", joined(*explained, f"{reason}; no time step removes it")
     reason += f" ({convergence.remark})" if convergence.remark else ""
     if verdict == "failed" and budget.cause == "setting":
@@ -116,8 +120,9 @@ def judge_order(claim: Claim, metric: Metric, convergence: Convergence) -> Judge
     if metric.name in JUMPING or (math.isnan(budget.order) and claimed != math.inf):
         return None
     verdict: Verdict = "measured"
-    if claimed is not None:  # no order above the last of `ORDERS` is fitted; an exact engine has none
-        verdict = "passed" if budget.order_upper >= (claimed if claimed == math.inf else min(claimed, ORDERS[-1])) else "failed"
+    if claimed is not None:
+        is_fitted = ORDERS[-1] < claimed <= budget.order + NEAR_ORDER  # above these orders, no interval is computed
+        verdict = "passed" if budget.order_upper >= claimed or is_fitted else "failed"
     steps = ", ".join(f"{dt:g}" for dt in budget.dts)
     claim_text = "" if claimed is None else f"; claimed {'exactness' if claimed == math.inf else f'{claimed:g}'}"
     reason = f"fitted at {steps} s{claim_text}" if steps else f"{budget.reason}{claim_text}"

@@ -44,6 +44,10 @@ from dropspin.scenarios.text import with_few_digits
 
 VANISHING = 0.5
 """Share of an error below which what may remain of it with finer options counts as nothing, as in an error budget."""
+BY_OPTIONS = 0.25
+"""Share of an asymptotic error by which other options change it at least, if it is due to those of the engine: an error in proportion to a
+power of 1/2 or more of a tolerance changes by more if the tolerance changes by a factor of 2 or more.
+"""
 FEWEST_STEPS = 8
 """A run of fewer steps is not worth adding."""
 
@@ -211,7 +215,7 @@ class EngineStudy:
                             its error at its largest value, which looks like an error that no time step removes. Its result counts if
                             it refutes the model error: `is_refuted`
             4. refined      an error that does not vanish with the time step alone, but together with the options that set the accuracy of
-                            the engine, is attributed to these options, if values next to those of the engine change it
+                            the engine, is attributed to these options, if values next to those of the engine change it by a quarter
             5. calibrated   a model error is a setting error if the engine with calibrated settings has none, or less than half of it
             6. jumping      a metric that jumps from flight to flight may stay at a value while the error that causes it falls: `of_jump`
 
@@ -267,9 +271,7 @@ class EngineStudy:
         plain = {point.dt: point.average.value for point in self.series[metric.name]}
         others = {dt for dt, finer in refined if finer.label != self.entry.label}
         changes = [abs(point.average.value) - abs(plain[point.dt]) for point in points if point.dt in others & plain.keys()]
-        # Finer options than those of the engine have to change the error, coarser ones by as much as they are to explain.
-        is_finest = not refined or refined[-1][1].label == self.entry.label
-        least = max(VANISHING * abs(found.budget.asymptotic_error) if is_finest else 0.0, negligible(self.own.scene, metric.unit))
+        least = max(BY_OPTIONS * abs(found.budget.asymptotic_error), negligible(self.own.scene, metric.unit))
         if not changes or not abs(changes[-1]) > least:
             return found
         lower, upper = min(found.budget.lower, 0.0), max(found.budget.upper, 0.0)

@@ -181,6 +181,9 @@ def test_known_limitation_excuses_failures_of_its_metric_and_size_only():
     assert (excused(1e-4).verdict, excused(1e-4).reason) == ("passed", "too large")
     uncertain = Convergence(ErrorBudget("model", "extrapolated", 0.021, 0.0195, 0.0225), 1e-3)
     assert judge_asymptotic_error(scene, claim, METRICS["energy_error"], uncertain).verdict == "limited"
+    wide = Convergence(ErrorBudget("model", "", -0.0198, -0.0253, -0.0001), 1e-3, finest_error=-0.0188, largest_error=0.0188)
+    smaller = Claim("mine", None, np.float64, (KnownLimitation("contacts slip", {"energy_error": 0.001}),))
+    assert judge_asymptotic_error(scene, smaller, METRICS["energy_error"], wide).verdict == "failed"
     # Of an error that grows with finer time steps, and of one that changes its sign near the finest.
     for finest_error, largest_error, verdict in ((-0.019, 0.019, "limited"), (-0.024, 0.024, "failed"), (0.001, 0.05, "failed")):
         grown = Convergence(ErrorBudget("model", "", -0.03, -0.035, -0.025), 1e-3, finest_error=finest_error, largest_error=largest_error)

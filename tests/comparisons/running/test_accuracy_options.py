@@ -106,6 +106,15 @@ class FinestByDefault(OfThree):
         return 0.0043 + 20.0 * tol + 0.5 * dt
 
 
+class LittleOfOption(OfThree):
+    """The engine's own value is between the others; the finest takes little of the error away."""
+
+    numbers: ClassVar = {"tol": NumericOption(1e-5, 0.0, 1.0)}
+
+    def error(self, dt, tol):
+        return 0.05 + 20.0 * tol + 0.5 * dt
+
+
 class HalfOfOption(Planted):
     """The finest value takes half of the error away; what remains with still finer ones is not known."""
 
@@ -129,6 +138,7 @@ FIVE, FOUR = (0.016, 0.008, 0.004, 0.002, 0.001), (0.004, 0.003, 0.002, 0.001)
         (OfThree, FOUR, "model"),  # the three finest steps span a factor of 3, too little to extrapolate with finer options
         (BreaksDown, FIVE, "model"),
         (FinestByDefault, FIVE, "model"),
+        (LittleOfOption, FIVE, "model"),
         (HalfOfOption, FIVE, "unresolved"),
         (Kinked, FIVE, "unresolved"),  # the finest steps alone would give an error that vanishes
     ],

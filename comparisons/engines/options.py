@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple, Self
 
-from dropspin.comparisons.engines.settings import Setting, spelled
+from dropspin.comparisons.engines.settings import SWITCH, Setting, spelled
 from dropspin.comparisons.measuring.symmetries import REPRESENTED
 from dropspin.scenarios.errors import DropspinError, verify_known
 from dropspin.scenarios.validation import shown
@@ -175,9 +175,10 @@ class Configured:
         return left if len(left) == len(options) else self.acting(left)  # which others may need
 
     def allows(self, name: str, value: str) -> bool:
-        """Whether a text is a value of a setting, one of its words if it has words, or of an option in `choices`."""
+        """Whether a text is a value of a setting, one of its words if these are not those of a switch, or of an option in `choices`."""
         words = self.choices[name] if name in self.choices else self.settings[name].values
-        return value in words if words else self.settings[name].parsed(value) is not None
+        is_switch = name in self.settings and all(word in SWITCH for word in words)
+        return value in words if words and not is_switch else self.settings[name].parsed(value) is not None
 
     @property
     def label(self) -> str:

@@ -90,6 +90,18 @@ def test_settings_that_need_each_other_are_left_out_together():
     assert Chained({"friction": "1", "contact": "on", "floor": "on"}).without(["floor"]).options == {}
 
 
+def test_reported_switch_is_no_word_of_another_setting():
+    """False may mean either word; of a switch it means off."""
+    kinds = {"grip": Setting("soft", "of a contact", values=("soft", "hard")), "sleep": Setting("off", "of a body", values=("off", "on"))}
+    engine_ = type("Worded", (Configured,), {"name": "worded", "settings": kinds})()
+    assert [engine_.allows(*one) for one in (("grip", "hard"), ("grip", "false"), ("sleep", "false"), ("sleep", "7"))] == [
+        True,
+        False,
+        True,
+        False,
+    ]
+
+
 def test_labels_have_settings_as_they_are_documented():
     assert engine("pybullet[linear_damping=.040,floor_restitution=0]").label == "pybullet[floor_restitution=0,linearDamping=0.04]"
     assert engine("mujoco[solref=-1e3 0,island=on]").label == "mujoco[island=enable,solref=-1000 0]"

@@ -114,7 +114,10 @@ def judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, conver
 
 
 def judge_order(claim: Claim, metric: Metric, convergence: Convergence) -> Judgement | None:
-    """Judge an observed order: it fails if its interval does not reach the claimed order; None if the errors follow no power of dt."""
+    """Judge an observed order; None if the errors follow no power of dt.
+
+    It fails if its interval does not reach the claimed order; or, above those of intervals, if the fitted order is not near it.
+    """
     budget = convergence.budget
     claimed = claim.order if budget.cause == "discretisation" else None
     if metric.name in JUMPING or (math.isnan(budget.order) and claimed != math.inf):

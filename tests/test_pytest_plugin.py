@@ -54,7 +54,7 @@ def test_marked_test_is_called_for_each_engine(repository):
             "spin-principal, absent:Engine: missing: *no_such_engine, which is not installed.",
             "spin-principal, unfit:Engine: broken: *division by zero*",
             "E * spin-principal, faulty: energy_error at 0.004 s is 0.002, expected -1e-06 … 1e-06",
-            f"E *    {reasons['energy_error']}",
+            f"E *    reason of the bound: {reasons['energy_error']}",
             "E *    Reproduce: dropspin run spin-principal -e engines:Faulty --dt 0.004 -o out/again",
             "E *    If this change is intended: dropspin accept .pytest_cache/d/dropspin/spin-principal-* "
             '--baseline dropspin-baseline.toml --known-failures --reason "…"; then use --dropspin-baseline dropspin-baseline.toml',

@@ -176,14 +176,14 @@ def _impulses(contact: Contact, response: Array) -> Iterator[tuple[str, Array]]:
     u_t = contact.approach - u_n * UP
     e, friction, slip = contact.floor.restitution, contact.floor.coefficient, float(np.linalg.norm(u_t))
     along = u_t / slip if slip > 0.0 else u_t
-    grip = slip / (along @ response @ along) if slip > 0.0 else 0.0
+    grip = slip / float(along @ response @ along) if slip > 0.0 else 0.0
 
     def by_slip(rebound: float, share: float) -> Array:
         return np.asarray(np.linalg.solve(response, (rebound - u_n) * UP - share * u_t))
 
-    def by_force(rebound: float, factor: float) -> Array:
+    def by_force(rebound: float, factor: float, most: float = grip) -> Array:
         normal = (rebound - u_n) / float(response[1, 1])
-        return normal * UP - np.sign(factor) * min(abs(factor) * friction * normal, grip) * along
+        return normal * UP - np.sign(factor) * min(abs(factor) * friction * normal, most) * along
 
     rebound, speed = -e * u_n, -u_n
     limit = friction * (1.0 + e) * speed / slip if slip > 0.0 and friction > 0.0 else 0.0
@@ -196,14 +196,11 @@ def _impulses(contact: Contact, response: Array) -> Iterator[tuple[str, Array]]:
     if limit == 0.0:
         return
     yield REVERSED, by_slip(rebound, 2.0 - share)
-    if 1.0 < limit < np.inf:
-        yield BEYOND, by_slip(rebound, limit)
     for against in {share, limit} - {np.inf}:
         yield AGAINST, by_slip(rebound, -against)
     if np.isfinite(friction):
-        normal = (rebound - u_n) / float(response[1, 1])
-        if friction * normal > grip:
-            yield BEYOND, normal * UP - friction * normal * along
+        yield BEYOND, by_slip(rebound, limit)
+        yield BEYOND, by_force(rebound, 1.0, np.inf)
         yield AGAINST, by_force(rebound, -1.0)
         for factor in (speed, 1.0 / slip, speed / slip, slip):
             yield IN_FRICTION, by_slip(rebound, min(factor * limit, 1.0))

@@ -176,9 +176,10 @@ class Configured:
 
     def allows(self, name: str, value: str) -> bool:
         """Whether a text is a value of a setting, one of its words if these are not those of a switch, or of an option in `choices`."""
-        words = self.choices[name] if name in self.choices else self.settings[name].values
-        is_switch = name in self.settings and all(word in SWITCH for word in words)
-        return value in words if words and not is_switch else self.settings[name].parsed(value) is not None
+        if name in self.choices:
+            return value in self.choices[name]
+        setting = self.settings[name]
+        return setting.parsed(value) is not None if all(word in SWITCH for word in setting.values) else value in setting.values
 
     @property
     def label(self) -> str:

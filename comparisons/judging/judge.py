@@ -18,9 +18,9 @@ from dropspin.comparisons.measuring.tolerances import negligible
 from dropspin.scenarios import Scenario, Truth
 
 OF_BOUND = "reason of the bound: "
+"""Before the reason of an expectation that fails: what the bound allows for, which need not be what is wrong."""
 NEAR_ORDER = 0.25
 """How far a fitted order above those of the intervals may be below the claimed one: half the distance of two orders there."""
-"""Before the reason of an expectation that fails: what the bound allows for, which need not be what is wrong."""
 
 
 def judge(

@@ -4,7 +4,7 @@ import math
 import shlex
 from collections.abc import Iterator, Sequence
 from operator import attrgetter, itemgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from dropspin.comparisons.judging.convergence import STUDIES
 from dropspin.comparisons.judging.verdicts import FAILURES
@@ -135,10 +135,7 @@ def settings_that_explain(results: Results, engine: str) -> Iterator[str]:
     """A sentence for each error that changed settings of an engine explain; scenes with the same settings share a sentence."""
     mine = results.table[(results.table["kind"] == "setting") & (results.table["engine"] == engine)].to_dict("records")
     by_scene = grouped(mine, itemgetter("scene", "metric", "dt", "basis"))
-    names = {of_scene: [row["truth"] for row in rows] for of_scene, rows in by_scene.items()}
-    # What calibrated settings take away differs from scene to scene.
-    alike = grouped(by_scene.items(), lambda item: (*item[0][1::2], *names[item[0]], item[0][0] * (ALL_SETTINGS in names[item[0]])))
-    for ((scene, metric, dt, basis), rows), *others in alike.values():
+    for ((scene, metric, dt, basis), rows), *others in grouped(by_scene.items(), _common).values():
         also = f"; the same settings explain it in {listed([where for (where, *_), _ in others])}" if others else ""
         change = "change of the " if basis == "since_accepted" else ""
         found, error = {row["truth"]: row["value"] for row in rows}, f"of the {change}{subject(metric, 'truth', '')} at {in_ms(dt)}"
@@ -147,6 +144,13 @@ def settings_that_explain(results: Results, engine: str) -> Iterator[str]:
             sign = ", so that an error of the other sign is left" if removed > OTHER_SIGN else ""
             of_this, error = f"calibrated settings take away {rounded(100.0 * removed, 3)} % {error}{sign}; ", "of this"
         yield f"{scene}: {of_this}{explained_by(found, error) if found else NONE_ALONE}{also}."
+
+
+def _common(of_scene: tuple[Any, list[Any]]) -> tuple[str, ...]:
+    """What scenes have in common that share a sentence; what calibrated settings take away differs from scene to scene."""
+    (scene, metric, _, basis), rows = of_scene
+    names = [row["truth"] for row in rows]
+    return metric, basis, *names, scene if ALL_SETTINGS in names else ""
 
 
 def _described(wrong: WrongParameter) -> str:

@@ -247,7 +247,7 @@ def _written(folder: Path, scene: Mapping[str, Any]) -> Path:
 
 
 def _message(row: Row) -> str:
-    """A row in one line: its subject, its value and its bounds."""
+    """A row in one line: its subject, its value, and its bounds or the interval of an extrapolated value."""
     if not row["metric"]:
         return f"{row['verdict']}: {row['reason']}"
     prefix = row["truth"] if row["kind"] == "baseline" else row["kind"] if row["kind"] in SUBJECTS else ""
@@ -256,7 +256,7 @@ def _message(row: Row) -> str:
     value = "undefined" if row["value"] is None else f"{row['value']:.3g}{unit}"
     lower, upper = ("" if row[end] is None else f"{row[end]:.3g}" for end in ("lower", "upper"))
     bounds = f"{lower} … {upper}" if lower and upper else f"≥ {lower}" if lower else f"≤ {upper}" if upper else ""
-    expected = f", expected {bounds}" if bounds else ""
+    expected = f", {'95 % interval' if row['kind'] in SUBJECTS else 'expected'} {bounds}" if bounds else ""
     return f"{SUBJECTS.get(prefix, prefix)} {row['metric']}{at} is {value}{expected}".strip()
 
 

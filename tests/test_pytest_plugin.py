@@ -119,6 +119,20 @@ def test_documentation(repository):
     done.assert_outcomes(passed=7)
 
 
+@pytest.mark.parametrize(
+    ("kind", "truth", "message"),
+    [
+        ("truth", "exact", "energy_error is -0.09, expected -0.0925 … -0.0868"),
+        ("asymptotic_error", "exact", "asymptotic energy_error is -0.09, 95 % interval -0.0925 … -0.0868"),
+        ("baseline", "accepted asymptotic error", "accepted asymptotic energy_error is -0.09, expected -0.0925 … -0.0868"),
+    ],
+)
+def test_only_bounds_are_called_expected(kind, truth, message):
+    """An extrapolated value is always inside its interval, also if it fails."""
+    row = {"metric": "energy_error", "kind": kind, "truth": truth, "dt": None, "unit": "1", "value": -0.09}
+    assert pytest_plugin._message(row | {"lower": -0.0925, "upper": -0.0868}) == message
+
+
 @pytest.mark.extended
 def test_messages_of_failing_tests(repository):
     """What failed, where the test called; a metric that was not measured; an unknown scene; a fixture without a scene."""

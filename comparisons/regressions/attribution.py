@@ -87,6 +87,10 @@ def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Origin, str]:
         found["engine"] = f"{name} {' → '.join(map(', '.join, versions))}"
     if engine in old["adapters"] and old["adapters"][engine] != new["adapters"].get(engine):
         found["adapter"] = f"the code of {name}'s adapter"
+    asked_for = [engine_name(stamp.get("names", {}).get(engine, "")) for stamp in (old, new)]
+    classes = [given.rpartition(":")[2] for given in asked_for if ":" in given]
+    if len({*classes}) == 2:  # two classes of one file may have the same name as engines
+        found["adapter"] = " → ".join(map(printable, asked_for))
     if changed := changed_settings(old, new, engine):
         found["settings"] = f"its settings ({', '.join(map(printable, changed))})"
     return found

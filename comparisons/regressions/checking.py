@@ -201,7 +201,7 @@ def _causes(found: pd.DataFrame, baseline: Baseline, results: Results) -> dict[i
     def attributed(engine: str, by: str, motions: Motion) -> Attribution:
         # Libraries that have not changed since the results of another engine were accepted are not excluded by these.
         unmoved = [other for other, accepted in same.items() if all(around(by).items() <= around(one).items() for one in accepted)]
-        return attribute(baseline.acceptances[by].stamp_of(engine), stamp, engine, unmoved, motions)
+        return attribute(baseline.acceptances[by].stamp_of(engine) | {"names": baseline.engines}, stamp, engine, unmoved, motions)
 
     failing = regressed(found)
     return {

@@ -86,7 +86,7 @@ def compare(old: Results, new: Results) -> Changes:
     changed, unmoved = found[found["change"] != "same"].groupby("engine"), unmoved_engines(found)
     attributions = {str(engine): attributed(rows, old, new, str(engine), unmoved) for engine, rows in changed}
     around = list(surroundings(old.provenance, new.provenance).values())
-    motions, judged = equal_motions(old, new, other), _judged_otherwise(old, new, found)
+    motions, judged = equal_motions(old, new, other), judged_otherwise(old, new, found)
     return Changes(found, attributions, around, other, _in_one_only(old, new), speed_changes(old, new), motions, judged)
 
 
@@ -98,15 +98,6 @@ def _why_nothing_is_compared(old: Results, new: Results, other: Sequence[str]) -
     return "no scene, engine and time step was requested in both"
 
 
-def _judged_otherwise(old: Results, new: Results, found: pd.DataFrame) -> dict[tuple[str, str, str], int]:
-    """`Changes.judged_otherwise`: such results have other bounds, or a limitation is declared in one of the runs alone."""
-    same = found.loc[found["change"] == "same", KEY]
-    verdicts = [comparable_results(results)[[*KEY, "verdict"]] for results in (old, new)]
-    both = same.merge(verdicts[0], on=KEY).merge(verdicts[1], on=KEY, suffixes=("_before", "_after"))
-    both = both[both["verdict_before"].isin(FAILURES) != both["verdict_after"].isin(FAILURES)]
-    return dict(Counter(both[["engine", "verdict_before", "verdict_after"]].itertuples(index=False, name=None)))
-
-
 def _changed_scenes(old: Results, new: Results) -> list[str]:
     """The scenes of both runs whose definitions differ."""
     return [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
@@ -116,6 +107,15 @@ def results_in_common(old: Results, new: Results) -> pd.DataFrame:
     """What was requested in both runs, in scenes that have not changed, compared."""
     asked = asked_for(comparable_results(old), new), asked_for(comparable_results(new), old)
     return most_changed_first(changes(*(rows[~rows["scene"].isin(_changed_scenes(old, new))] for rows in asked)))
+
+
+def judged_otherwise(old: Results, new: Results, found: pd.DataFrame) -> dict[tuple[str, str, str], int]:
+    """`Changes.judged_otherwise` of compared results: they have other bounds, or a limitation is declared in one of the runs alone."""
+    same = found.loc[found["change"] == "same", KEY]
+    verdicts = [comparable_results(results)[[*KEY, "verdict"]] for results in (old, new)]
+    both = same.merge(verdicts[0], on=KEY).merge(verdicts[1], on=KEY, suffixes=("_before", "_after"))
+    both = both[both["verdict_before"].isin(FAILURES) != both["verdict_after"].isin(FAILURES)]
+    return dict(Counter(both[["engine", "verdict_before", "verdict_after"]].itertuples(index=False, name=None)))
 
 
 def unmoved_engines(found: pd.DataFrame) -> list[str]:

@@ -1,13 +1,14 @@
 """Histories of runs: the runs in which results changed, and the causes to which the changes are attributed."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import pandas as pd
 
 from dropspin.comparisons.regressions.attribution import Attribution
 from dropspin.comparisons.regressions.changes import KEY, asked_for, changes, comparable_results, most_changed_first, verify_comparable
-from dropspin.comparisons.regressions.comparing import attributed, results_in_common, unmoved_engines
+from dropspin.comparisons.regressions.comparing import attributed, judged_otherwise, results_in_common, unmoved_engines
 from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.table import are_among
@@ -46,12 +47,15 @@ class History(NamedTuple):
         stamps: Time, commit and versions of each run.
         results: The comparable results of all runs; `run` is the number of the run, `scene_digest` a hash of the scene's physics.
         moves: The changes, in the order of the runs.
+        judged_otherwise: For each run but the first, the results with the value of the run before that are judged otherwise, as in
+            `comparing.Changes`.
     """
 
     names: list[str]
     stamps: pd.DataFrame
     results: pd.DataFrame
     moves: list[Move]
+    judged_otherwise: Sequence[Mapping[tuple[str, str, str], int]]
 
 
 def history(runs: Mapping[str, Results]) -> History:
@@ -62,7 +66,8 @@ def history(runs: Mapping[str, Results]) -> History:
 
     Returns:
         `names` of the runs in order; `stamps`, their times, commits and versions; `results`, the values of all runs; and `moves`, the
-        runs in which results changed, and the cause to which each change is attributed.
+        runs in which results changed, and the cause to which each change is attributed; `judged_otherwise`, how many unchanged results are
+        judged otherwise in each run.
 
     Raises:
         DropspinError: There are fewer than two runs, or one of them was made with `quick`.
@@ -78,7 +83,8 @@ def history(runs: Mapping[str, Results]) -> History:
     ]
     measured = [_defined(comparable_results(one), one) for one in results]
     every = pd.concat([rows.assign(run=number) for number, rows in enumerate(measured)], ignore_index=True)
-    return History(names, pd.DataFrame(stamps), every, _moves(results, measured))
+    judged = [judged_otherwise(before, now, results_in_common(before, now)) for before, now in pairwise(results)]
+    return History(names, pd.DataFrame(stamps), every, _moves(results, measured), judged)
 
 
 def _defined(rows: pd.DataFrame, run: Results) -> pd.DataFrame:

@@ -1,7 +1,7 @@
 """The output of `dropspin compare`: the changes between two runs."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from dropspin.comparisons.regressions.changes import EqualMotions, SpeedChange
@@ -85,9 +85,7 @@ def _notes(changes: Changes) -> list[str]:
         kinds = changes.results.loc[changes.results["engine"] == engine, "change"]
         counts = ", ".join(f"{count:,} {change}" for change in TITLES if (count := int((kinds == change).sum())))
         notes.append(f"{engine}: {counts}. {capitalized(cause.message)}.")
-    for (engine, before, after), count in changes.judged_otherwise.items():
-        are = counted(count, "result with the same value is", "results with the same values are")
-        notes.append(f"{engine}: {are} now {after} instead of {before}.")
+    notes += judged_otherwise(changes.judged_otherwise, "now")
     if changes.surroundings and not changes.attributions:
         notes.append(f"No result has changed, although these differ between the runs: {', '.join(changes.surroundings)}.")
     if changes.other_scenes:
@@ -96,6 +94,13 @@ def _notes(changes: Changes) -> list[str]:
         notes.append(f"Not compared, because only one of the runs has them: {', '.join(changes.in_one_only)}.")
     notes += map(_speed, changes.speed)
     return notes + ([f"Motions equal bit for bit: {'; '.join(map(_motions, changes.motions))}."] if changes.motions else [])
+
+
+def judged_otherwise(judged: Mapping[tuple[str, str, str], int], when: str) -> Iterator[str]:
+    """For each kind of `Changes.judged_otherwise` a sentence; `when` is "now", or names the run."""
+    for (engine, before, after), count in judged.items():
+        are = counted(count, "result with the same value is", "results with the same values are")
+        yield f"{engine}: {are} {when} {after} instead of {before}."
 
 
 def _speed(change: SpeedChange) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dropspin.comparisons.regressions.history import DEFINED, History
 from dropspin.reports.document import Charts, Document, Heading, Part, Rows, Sentences, Table
 from dropspin.reports.plots.history import result_over_runs
-from dropspin.reports.stories.compare import change_cells
+from dropspin.reports.stories.compare import change_cells, judged_otherwise
 from dropspin.reports.stories.numbers import capitalized
 from dropspin.scenarios.text import counted
 
@@ -20,12 +20,17 @@ def document(history: History) -> Document:
         f"{capitalized(move.attribution.message)}."
         for move in history.moves
     ]
+    judged = [
+        sentence
+        for name, of_run in zip(history.names[1:], history.judged_otherwise, strict=True)
+        for sentence in judged_otherwise(of_run, f"in {name}")
+    ]
     scenes = counted(history.results["scene"].nunique(), "scene")
     unchanged = f"No result changed in {counted(len(history.names), 'run')} of {scenes}."
     if not history.results.duplicated(DEFINED).any():
         unchanged = "No result was compared, because no two runs have one in common."
     changed = rows(history)
-    parts: list[Part] = [Table(changed), Sentences([*(causes or [unchanged]), *_redefined(history)])]
+    parts: list[Part] = [Table(changed), Sentences([*(causes or [unchanged]), *judged, *_redefined(history)])]
     drawn = history.results[~history.results["kind"].isin(["order", "asymptotic_error"])]
     for scene in history.results["scene"].unique():
         metrics = drawn.loc[drawn["scene"] == scene, "metric"].unique()

@@ -12,6 +12,7 @@ STAMP = {
     "platform": "Linux",
     "code": "c",
     "adapters": {"candidate": "a"},
+    "names": {"candidate": "old:Ball"},
     "settings": {"candidate": {"drop-ball dt=0.001": {"version": "1.0", "solref": 1}}},
 }
 
@@ -22,6 +23,8 @@ def settings(version, solref):
 
 UNKNOWN = "the cause cannot be isolated, because it is not recorded whether the motions of candidate differ"
 
+UNKNOWN_CHANGE = "no recorded property differs; the engine is not deterministic, or has changed without a new version"
+
 
 @pytest.mark.parametrize(
     ("now", "unmoved", "origin", "message"),
@@ -30,12 +33,15 @@ UNKNOWN = "the cause cannot be isolated, because it is not recorded whether the 
             {},
             [],
             "nothing",
-            "no recorded property differs; the engine is not deterministic, or has changed without a new version",
+            UNKNOWN_CHANGE,
         ),
         (settings("1.1", 1), [], "engine", "attributed to the engine: candidate 1.0 → 1.1"),
         (settings("1.0", 2), [], "settings", "attributed to its settings: its settings (solref)"),
         (settings("1.1", 2), [], "engine", "attributed to the engine: candidate 1.0 → 1.1, its settings (solref)"),
         ({"adapters": {"candidate": "b"}}, [], "adapter", "attributed to its adapter: the code of candidate's adapter"),
+        ({"names": {"candidate": "new:Half"}}, [], "adapter", "attributed to its adapter: old:Ball → new:Half"),
+        ({"names": {"candidate": "a/old.py:Ball[x=1]"}}, [], "nothing", UNKNOWN_CHANGE),
+        ({"names": {"candidate": "candidate"}}, [], "nothing", UNKNOWN_CHANGE),
         ({"cpu": "B"}, [], "surroundings", "attributed to the surroundings: processor A → B"),
         ({"code": "d"}, [], "either", f"dropspin's own code; {UNKNOWN}"),
         ({"versions": STAMP["versions"] | {"dropspin": "2"}}, [], "either", f"dropspin 1 → 2; {UNKNOWN}"),

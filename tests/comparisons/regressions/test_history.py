@@ -86,6 +86,18 @@ def test_scene_that_returns_to_a_definition_is_compared_with_the_last_run_of_it(
     assert redefined == "fall-spin has another definition in b, c than in the run before: only runs with the same one are compared."
 
 
+def test_results_with_the_same_values_that_are_judged_otherwise_are_named_with_the_run(before):
+    """In the second run a bound is narrower: no result changed, but its checks fail."""
+    table = before.table
+    fails = (table["metric"] == "energy_error") & (table["engine"] == "candidate") & (table["kind"] == "truth")
+    passed, failed = (replace(before, table=table.assign(verdict=table["verdict"].mask(fails, to))) for to in ("passed", "failed"))
+    runs = history(dated(passed, failed, failed))
+    assert runs.judged_otherwise == [{("candidate", "passed", "failed"): fails.sum()}, {}]
+    unchanged, judged = document(runs).parts[1].items
+    assert unchanged.startswith("No result changed")
+    assert judged == f"candidate: {fails.sum()} results with the same values are in b failed instead of passed."
+
+
 def test_history_without_two_runs_of_one_definition_does_not_say_that_nothing_changed(before, longer_fall):
     first, _ = document(history(dated(part(before, "fall-spin"), longer_fall))).parts[1].items
     assert first == "No result was compared, because no two runs have one in common."

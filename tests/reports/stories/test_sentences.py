@@ -67,7 +67,7 @@ def lost(*scenes, difference=0.25):
 
 def unchanged(*names):
     results = pd.DataFrame([dict.fromkeys(DEFINED, "order") | {"run": run} for run in range(2)])
-    return history.document(History(list(names), pd.DataFrame(), results, [])).parts[1].items[0]
+    return history.document(History(list(names), pd.DataFrame(), results, [], [{} for _ in names[1:]])).parts[1].items[0]
 
 
 def modelled(**tables):

@@ -171,7 +171,11 @@ class Runs:
             command, cwd=self.root, env=environment, stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", check=False
         )
 
-    def judge(self, node: pytest.Item, result: Result, rows: Iterable[Row], *, pytrace: bool = False) -> None:
+    def _fails(self, row: Row) -> bool:
+        """Whether a row fails: a missing engine does if the command line names it, or if it is an adapter of the user."""
+        return row["verdict"] in FAILING or (row["verdict"] == "missing" and (self.named or ":" in row["engine"].partition("[")[0]))
+
+    def judge(self, node: pytest.Item, result: Result, rows: Sequence[Row], *, pytrace: bool = False) -> None:
         """Fail or skip a test by the verdicts of some rows of a run, and keep the rows for the summary.
 
         Args:
@@ -181,8 +185,10 @@ class Runs:
             pytrace: Whether the failure shows the lines of the calling test.
         """
         __tracebackhide__ = True
-        fails = FAILING | {"missing"} if self.named else FAILING
-        judged = [row | {"message": _message(row), "fails": row["verdict"] in fails} for row in rows]
+        added = [
+            {"message": _message(row), "fails": self._fails(row), "asked": (result.given, result.engines[row["engine"]])} for row in rows
+        ]
+        judged = [row | more for row, more in zip(rows, added, strict=True)]
         node.stash.setdefault(JUDGED, []).extend(row for row in judged if row["fails"] or row["verdict"] in STOPPED | {"passed", "known"})
         failing = [row for row in judged if row["fails"]]
         if failing:
@@ -384,16 +390,16 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """Print a line for each judged engine and scene, and the folder of the runs."""
-    judged: dict[tuple[str, str], dict[tuple[Any, ...], Row]] = {}
+    judged: dict[tuple[str, ...], dict[tuple[Any, ...], Row]] = {}
     for report in (report for reports in terminalreporter.stats.values() for report in reports):
         for row in getattr(report, NAME, ()):
             # Several tests may judge the same row, such as that of a crash.
             key = tuple(row[name] for name in ("metric", "kind", "truth", "dt", "verdict"))
-            judged.setdefault((row["engine"], row["scene"]), {})[key] = row
+            judged.setdefault((row["engine"], row["scene"], *row["asked"]), {})[key] = row
     if not judged:
         return
     lines = [("engine", "scene", "passed", "failed", "known", "message")]
-    for (engine, scene), by_key in judged.items():
+    for (engine, scene, *_), by_key in judged.items():
         rows = by_key.values()
         tally = (sum(row[key] == value for row in rows) for key, value in (("verdict", "passed"), ("fails", True), ("verdict", "known")))
         lines.append((engine, scene, *map(str, tally), max(rows, key=itemgetter("fails"))["message"]))

@@ -226,9 +226,8 @@ def baseline(repository):
 @pytest.mark.usefixtures("baseline")
 def test_result_worse_than_accepted_fails(repository):
     """With the bound of the baseline; a better one passes, and a missing engine that only the configuration file names does not fail."""
-    repository.makeini("[pytest]\ndropspin_baseline = base.toml\ndropspin_engines = engines:Mine\n  engines:Faulty\n  absent:Engine")
+    repository.makeini("[pytest]\ndropspin_baseline = base.toml\ndropspin_engines = engines:Mine\n  engines:Faulty\n  genesis")
     repository.makepyfile(
-        absent="import no_such_engine",
         test_own="""
         def test_all(dropspin_check):
             dropspin_check("spin-principal", dt=0.004)
@@ -245,7 +244,7 @@ def test_result_worse_than_accepted_fails(repository):
             '--baseline base.toml --known-failures --reason "…"',
             "mine * spin-principal * 3 * 0 * 0  *",
             "faulty * spin-principal * 0 * 3 * 0  *",
-            "absent:Engine * spin-principal * 0 * 0 * 0  missing: *",
+            "genesis * spin-principal * 0 * 0 * 0  missing: *",
         ]
     )
 
@@ -265,6 +264,36 @@ def test_marked_test_of_an_engine_whose_accepted_results_are_gone_fails(reposito
             "spin-principal, absent:Engine: failed: 1 accepted results are gone, missing: *",
         ]
     )
+
+
+def test_own_adapter_that_cannot_be_imported_fails_wherever_it_is_named(repository):
+    """A test that also runs another engine would pass without it."""
+    repository.makepyfile(
+        absent="import no_such_engine",
+        test_own="""
+        def test_both(dropspin_check):
+            dropspin_check("spin-principal", engine=["absent:Engine", "engines:Mine"], dt=0.004)
+        """,
+    )
+    done = repository.runpytest_inprocess()
+    done.assert_outcomes(failed=1)
+    done.stdout.fnmatch_lines(["E * spin-principal, absent:Engine: missing: *no_such_engine, which is not installed."])
+
+
+def test_scenes_of_one_name_have_lines_of_their_own(repository):
+    """In the summary, which counts equal rows once."""
+    repository.makepyfile(
+        test_own="""
+        def test_both(dropspin_check):
+            bound = {"metric": "energy_error", "below": 1e-9, "reason": "no force acts on it"}
+            body = {"shape": "sphere", "radius": 0.1, "mass": 1.0}
+            for duration in (0.2, 0.4):
+                scene = {"name": "own", "duration": duration, "body": body, "expect": [bound]}
+                dropspin_check(scene | {"start": {"angular_velocity": [0.0, 1.0, 0.0]}}, engine="engines:Mine", dt=0.004)
+        """
+    )
+    done = repository.runpytest_inprocess()
+    done.stdout.fnmatch_lines(["mine * own * 1 * 0 * 0  *"] * 2)
 
 
 @pytest.mark.extended

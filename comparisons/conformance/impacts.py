@@ -51,6 +51,8 @@ BEYOND = (
 INTO_FLOOR = "restitution has the wrong sign: the contact point goes on into the floor"
 OF_REBOUND = (IN_NORMAL, INTO_FLOOR)
 AT_START = "the inertia is rotated by the orientation at the start: in the world frame it is R I Rᵀ with the R of the impact"
+NO_TURN = "the impulse does not turn the body: I⁻¹ (r × j) is not added to the angular velocity"
+POINT_MASS = "the impulse is that of a point mass: K = 1/M - r* I⁻¹ r* lacks its second term"
 BY_SLIP = "friction reduces the slip by at most µ (1 + e) times the approach speed, which follows from Coulomb's law for a point mass only"
 OF_NOTE = (
     "impacts follow eq 11 and 15 of Wang's lecture note, whose impulse is not normal to the floor; if this is intended, name 'law note' "
@@ -159,11 +161,13 @@ def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:
 
 def _predictions(contact: Contact) -> Iterator[tuple[str, Array]]:
     """Mistakes, and the velocities after an impact with each, shape (6,); the rule of the lecture note's laboratory is the first."""
-    inverses = {mistake: inverse(contact.axes, contact.inertia) for mistake, inverse in INVERSES.items()}
-    inverses[AT_START] = INVERSES[""](contact.axes_at_start, contact.inertia)
-    for message, impulse in _impulses(contact, response_of(contact.point, contact.mass, inverses[""])):
-        yield message, contact.after(impulse, inverses[""])
-    for (in_response, of_response), (in_turn, of_turn) in product(inverses.items(), repeat=2):
+    right, *wrong = ((mistake, inverse(contact.axes, contact.inertia)) for mistake, inverse in INVERSES.items())
+    wrong.append((AT_START, INVERSES[""](contact.axes_at_start, contact.inertia)))
+    for message, impulse in _impulses(contact, response_of(contact.point, contact.mass, right[1])):
+        yield message, contact.after(impulse, right[1])
+    # Nothing comes before an inertia that is not inverted: that of a small body is nearly nothing beside its inverse.
+    responses, turns = ([right, (absent, np.zeros((3, 3))), *wrong] for absent in (POINT_MASS, NO_TURN))
+    for (in_response, of_response), (in_turn, of_turn) in product(responses, turns):
         if in_response or in_turn:
             for message, impulse in _impulses(contact, response_of(contact.point, contact.mass, of_response)):
                 if message == BY_SLIP:

@@ -154,8 +154,10 @@ def _best(
                 del explained[fault]
             else:
                 contradicted[fault] += 1
-    least = contradicted if is_pair else dict.fromkeys(explained, 0)
-    likely = [fault for fault, number in explained.items() if number > least[fault] or contradicted[fault] < CONTRADICTIONS]
+    if is_pair:
+        likely = [fault for fault, number in explained.items() if number > contradicted[fault]]
+    else:
+        likely = [fault for fault, number in explained.items() if number > 0 or contradicted[fault] < CONTRADICTIONS]
     return max(likely, key=explained.__getitem__, default=None)
 
 

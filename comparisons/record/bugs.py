@@ -122,7 +122,7 @@ class Verdict(NamedTuple):
 
     Attributes:
         kind: Whether the newest release shows it; `fixed` if only older ones do.
-        since: The first release that does not show it.
+        since: The first release after those with the fault that does not show it; one with another value proves nothing.
     """
 
     kind: Literal["shown", "fixed", "not shown", "not expressible", "not run"]
@@ -162,7 +162,7 @@ def verdict(bug: Bug, outcomes: Sequence[Outcome]) -> Verdict:
         return Verdict("shown")
     if "shown" in states and states[-1] == "not shown":
         last = len(states) - 1 - states[::-1].index("shown")
-        return Verdict("fixed", outcomes[last + 1].release)
+        return Verdict("fixed", outcomes[states.index("not shown", last)].release)
     return Verdict("not shown")
 
 

@@ -4,12 +4,12 @@ import re
 
 import numpy as np
 import pytest
-from support.students import Solver, student
+from support.students import Solver, Student, student
 from support.transcription import UP, quaternion_product, rotation_matrix
 
 from dropspin.comparisons.conformance import motions
 from dropspin.comparisons.conformance.checks import run_check
-from dropspin.comparisons.conformance.impacts import AT_START, BY_SLIP, IN_NORMAL, OF_NOTE
+from dropspin.comparisons.conformance.impacts import AT_START, BY_SLIP, IN_NORMAL, NO_TURN, OF_NOTE, POINT_MASS
 from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.running.arguments import EngineEntry
@@ -81,6 +81,10 @@ def unlimited(self, slip, u_normal):
     return friction * (1.0 + self.restitution) * self.quotient(abs(u_normal), np.linalg.norm(slip))
 
 
+def turning(self, R):
+    return R @ inv(self.inertia) @ R.T
+
+
 SWAPPED = {"rate": lambda self: quaternion_product(self.q, np.append(self.w, 0.0))}
 NOT_ROTATED, NOT_INVERTED = "the inertia is not rotated into the world frame", "the inverse of the inertia is not taken"
 SQUARE, AGAINST = "the square of the speed is used in place of the speed", "friction has the wrong sign"
@@ -92,6 +96,13 @@ MISTAKES = {
     "inertia rotated back": ("rotated in the wrong direction", "impacts", {"inverse_inertia": lambda self, R: R.T @ inv(self.inertia) @ R}),
     "inverse not taken": (NOT_INVERTED, "corner", {"inverse_inertia": lambda self, R: R @ self.inertia @ R.T}),
     "inverse not taken in K": (NOT_INVERTED, "impacts", {"inverse_in_k": lambda self, R: R @ self.inertia @ R.T}),
+    "no turn": (re.escape(NO_TURN), "impacts", {"inverse_inertia": lambda self, R: np.zeros((3, 3)), "inverse_in_k": turning}),
+    "a ball does not turn": (
+        re.escape(NO_TURN),
+        "slippery floor",
+        {"inverse_inertia": lambda self, R: np.zeros((3, 3)), "inverse_in_k": turning},
+    ),
+    "point mass in K": (re.escape(POINT_MASS), "impacts", {"inverse_in_k": lambda self, R: np.zeros((3, 3))}),
     "neither": (f"{NOT_INVERTED}.*; and {NOT_ROTATED}", "gripping corner", {"inverse_inertia": lambda self, R: self.inertia}),
     "friction along the slip": (AGAINST, "impacts", {"wanted_slip": lambda self, slip, n: self.share(slip, n) * slip}),
     "friction along the slip of a ball": (AGAINST, "slippery floor", coulomb(-1.0)),
@@ -128,6 +139,14 @@ def test_wrong_inertia_is_not_taken_for_a_wrong_rebound():
     engine_ = student(inverse_in_k=lambda self, R: R @ self.inertia @ R.T)
     type(engine_).shapes, type(engine_).declines = ("capsule",), lambda self, scene: None
     assert found(engine_, "striking capsule")["striking capsule"].startswith(NOT_INVERTED)
+
+
+@pytest.mark.extended
+def test_two_faults_of_which_one_does_not_act_are_not_named():
+    """Half of the turn of an impact looks like twice the inertia on this floor, which boxes exclude, and pairs add a fault elsewhere."""
+    engine_ = student(inverse_inertia=lambda self, R: 0.5 * turning(self, R), inverse_in_k=turning, **coulomb())
+    type(engine_).declines = lambda self, scene: "damping" if scene.damping else Student.declines(self, scene)
+    assert found(engine_, "slippery floor")["slippery floor"].startswith("attitude is off by")
 
 
 def test_mistake_of_restitution_that_another_probe_excludes_is_not_named(monkeypatch):

@@ -59,6 +59,7 @@ def test_friction_that_is_too_weak_in_every_direction_does_not_depend_on_the_dir
         (["shown", "shown", "not shown"], Verdict("fixed", "1.2")),
         (["shown", "not shown", "not shown"], Verdict("fixed", "1.1")),
         (["shown", "another value"], Verdict("not shown")),
+        (["not shown", "shown", "another value", "not shown"], Verdict("fixed", "1.3")),
         (["not shown"], Verdict("not shown")),
         (["another value"], Verdict("not shown")),
         (["shown", "not run"], Verdict("not run")),

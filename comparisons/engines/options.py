@@ -163,6 +163,11 @@ class Configured:
         """The same engine with calibrated settings; its other options stay."""
         return self.without(["profile", *self.settings])
 
+    @property
+    def untuned(self) -> Self:
+        """The calibrated engine with the defaults of its numeric options, but for those that set the accuracy."""
+        return self.calibrated.without(set(self.numbers).difference(self.accuracy))
+
     def without(self, names: Collection[str]) -> Self:
         """The same engine without some of its options, and without settings that then have no effect."""
         return replace(self, options=self.acting({name: text for name, text in self.options.items() if name not in names}))

@@ -78,7 +78,8 @@ def causes(results: Results, engine: str) -> Causes:
     if failed.empty:
         return Causes([], [], {})
     dt = min(map(float, results.provenance["asked"]["dts"]))
-    scenes = [(results.scenes[str(name)], rows.to_dict("records")) for name, rows in judged.groupby("scene")]
+    absent = _absent(table[table["engine"] == engine])
+    scenes = [(results.scenes[str(name)], rows.to_dict("records"), absent.get(str(name), [])) for name, rows in judged.groupby("scene")]
     scenes.sort(key=lambda scene: all(row["verdict"] != "failed" for row in scene[1]))  # those that fail exclude most causes
     widths = (failed["upper"] - failed["lower"]) / failed["value"].abs()
     narrowest = failed.loc[widths.sort_values().index].groupby("scene", sort=False)  # first the scene whose sizes are the most precise
@@ -88,8 +89,8 @@ def causes(results: Results, engine: str) -> Causes:
     def holds(fault: FaultModel) -> bool:
         widths: list[float] = []
         left = []
-        for scene, rows in scenes:
-            found = _explained(scene, fault, rows, dt)
+        for scene, rows, undefined in scenes:
+            found = _explained(scene, fault, rows, undefined, dt)
             if found is None:
                 return False
             widths += found[0]
@@ -105,8 +106,15 @@ def causes(results: Results, engine: str) -> Causes:
     faults: dict[object, FaultModel] = {}  # the first one of those that are the same in all of these scenes
     for fault in FAULT_MODELS:
         if fault.about != "start" and holds(fault):
-            faults.setdefault((fault.reported, *(_simulated(fault, scene) for scene, _ in scenes)), fault)
+            faults.setdefault((fault.reported, *(_simulated(fault, scene) for scene, *_ in scenes)), fault)
     return Causes(parameters, list(faults.values()), unexamined)
+
+
+def _absent(table: pd.DataFrame) -> dict[str, list[str]]:
+    """By scene, the metrics of an engine's rows whose event occurs at no time step, such as a bounce that there should be."""
+    rows = table[table["kind"].isin(["truth", "invariant"])]
+    is_absent = (rows["value"].isna() & (rows["verdict"] == "failed")).groupby([rows["scene"], rows["metric"]]).all()
+    return {str(scene): list(found["metric"]) for scene, found in is_absent[is_absent].reset_index().groupby("scene")}
 
 
 def _sizes(scene: Scenario, parameter: Parameter, failed: pd.DataFrame, dt: float) -> Iterator[float]:
@@ -134,12 +142,16 @@ def _sizes(scene: Scenario, parameter: Parameter, failed: pd.DataFrame, dt: floa
             yield size
 
 
-def _explained(scene: Scenario, fault: FaultModel, rows: list[dict[Hashable, Any]], dt: float) -> tuple[list[float], int] | None:
+def _explained(
+    scene: Scenario, fault: FaultModel, rows: list[dict[Hashable, Any]], undefined: Sequence[str], dt: float
+) -> tuple[list[float], int] | None:
     """The relative widths of the failed asymptotic errors of a scene that a cause has, and how many of them could be compared.
 
-    None if it has another error than one of those that it defines.
+    None if it has another error than one of those that it defines, or has one whose event does not occur.
     """
     fine = _caused(scene, fault, 0.5 * dt)
+    if any(not np.isnan(fine.error(metric)) for metric in undefined):
+        return None
     halves = [_caused(scene, fault, dt, start) for start in (0.0, 0.5)]  # of its samples: the last one before an impact is in one alone
     widths, compared = [], 0
     for row in rows:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from dropspin.comparisons.judging.convergence import JUMPING
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.results.results import Results, relative_sizes
 from dropspin.comparisons.results.table import are_among
@@ -27,7 +27,8 @@ ENOUGH = 3
 class Answer:
     """What a run says about one engine and one metric.
 
-    Its scenes are those in which any engine has an error in this metric, and those in which it applies and every engine broke down.
+    Its scenes are those in which any engine has an error in this metric, or has none because it fails or another one broke down, and those
+    in which the metric applies and every engine broke down.
 
     Attributes:
         metric: The metric.
@@ -109,12 +110,15 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     keys = ["engine", "scene", "dt"]
     steps = tried[keys].assign(default=np.where(is_broken[tried.index], "beyond", "undecided")).drop_duplicates(keys)
     declined = table[table["verdict"] == "declined"].drop_duplicates(["engine", "scene"])
-    lost_scenes = set(table.loc[is_broken, "scene"]) - set(table.loc[is_exact, "scene"]) - set(results.recorded)
+    broken = set(table.loc[is_broken, "scene"])
+    lost_scenes = broken - set(table.loc[is_exact, "scene"]) - set(results.recorded)
     truths = {name: (results.scenes[name], exact_solution(results.scenes[name])) for name in sorted(lost_scenes)}
     answers = []
     for metric in QUESTIONS:
-        rows = found.loc[found["metric"] == metric, [*keys, "state", "size", "cost"]]
-        scenes = {*rows["scene"], *(name for name, known in truths.items() if METRICS[metric].applies(*known))}
+        of_metric = found[found["metric"] == metric]
+        tests = of_metric["value"].notna() | of_metric["verdict"].isin(FAILURES) | of_metric["scene"].isin(broken)
+        rows = of_metric[[*keys, "state", "size", "cost"]]
+        scenes = {*rows.loc[tests, "scene"], *(name for name, known in truths.items() if METRICS[metric].applies(*known))}
         tested = steps[steps["scene"].isin(scenes)].merge(rows, how="left", on=keys)
         tested["state"] = tested["state"].fillna(tested["default"])
         for engine in results.engines:

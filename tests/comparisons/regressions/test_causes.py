@@ -206,7 +206,7 @@ def test_sampling_excludes_no_cause():
         fault = _with(gravity, size)
         gain = _caused(ball, fault, 4e-5).error("energy_gain")
         row = {"metric": "energy_gain", "unit": "1", "verdict": "failed", "cause": "model", "value": gain}
-        widths, compared = _explained(ball, fault, [row | {"lower": gain - 2e-6, "upper": gain + 2e-6}], 2e-3)
+        widths, compared = _explained(ball, fault, [row | {"lower": gain - 2e-6, "upper": gain + 2e-6}], [], 2e-3)
         assert len(widths) == compared == 1, size
 
 
@@ -227,6 +227,15 @@ def test_cause_of_one_error_that_is_hardly_known_or_of_one_that_rounding_exclude
     table = shared.assign(**pd.DataFrame(rows))
     found = causes(replace(results, table=table), "exact").parameters
     assert ("gravity" in [wrong.parameter.name for wrong in found]) == named
+
+
+def test_cause_with_a_bounce_that_does_not_occur_is_excluded():
+    """Without gravity a ball keeps its energy and its height, as with a restitution of 1."""
+    hovering = Made(title="hovering", change=with_gravity(np.zeros((3, 3))))
+    found = causes(run([lasting("drop-ball")], hovering, STEPS), "hovering")
+    assert not found.parameters
+    assert [fault.message for fault in found.faults if "restitution" in fault.message] == []
+    assert "gravity is omitted" in {fault.message for fault in found.faults}
 
 
 def test_moments_that_no_body_has_explain_no_error():

@@ -9,6 +9,7 @@ from support.fault_suite import with_restitution
 from support.sampled import Sampled, undistorted
 
 from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.engines.options import NumericOption
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.engines.settings import Setting
 from dropspin.comparisons.running.ablation import explaining, shares, written_out
@@ -241,6 +242,22 @@ def test_option_that_a_default_profile_changes_is_reset_too():
     ball = load("drop-ball").model_copy(update={"duration": 0.8})
     found = run(ball, [Choosing({"profile": "default"})], [1e-3], quick=True).table.query("kind == 'setting'")
     assert dict(zip(found["truth"], found["value"], strict=True)) == {"soft=0.05, solver=rough": pytest.approx(0.945, abs=0.01)}
+
+
+def test_number_that_the_adapter_adds_is_reset_too_unless_it_sets_the_accuracy():
+    """Such as `kappa` of MuJoCo's adapter."""
+
+    class Numbered(Losing):
+        numbers: ClassVar = {name: NumericOption(0.0, 0.0, 1.0) for name in ("damper", "tolerance")}
+        accuracy: ClassVar = {"tolerance": (0.1, 0.01, 0.0)}
+
+        def prepare(self, scene, dt):
+            return replace(self, model=sum(float(self.option(name)) for name in self.numbers)).losing(scene, dt)
+
+    ball = load("drop-ball").model_copy(update={"duration": 0.8})
+    found = run(ball, [Numbered({"damper": "0.1"}), Numbered({"tolerance": "0.1"})], [1e-3], quick=True).table.query("kind == 'setting'")
+    assert list(zip(found["engine"], found["truth"], strict=True)) == [("losing[damper=0.1]", "damper=0.1")]
+    assert list(found["value"]) == pytest.approx([1.0], abs=0.01)
 
 
 def test_settings_that_make_less_than_half_of_an_error_are_not_its_cause():

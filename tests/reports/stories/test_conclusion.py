@@ -3,13 +3,14 @@
 import math
 import re
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 import pytest
 
 import dropspin as ds
 from dropspin.comparisons.measuring.tolerances import scale
-from dropspin.comparisons.results.conclusion import CONDITIONS
+from dropspin.comparisons.results.conclusion import CONDITIONS, conclude
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.table import Measurement, as_table
 from dropspin.reports.plots.colours import in_sentence
@@ -93,10 +94,14 @@ def states(run, metric, engine, scene):
 
 
 def scenes_of(run, metric):
-    """The scenes that test a metric: those with an error of any engine, and those in which it applies and engines only broke down."""
+    """The scenes that test a metric: those with an error of any engine, and those in which it applies and engines only broke down.
+
+    Where an engine broke down, an error that is undefined for all others is one too: it may be defined for that engine.
+    """
     exact = [row for row in records(run) if row["kind"] == "truth"]
-    lost = {row["scene"] for row in records(run) if row["verdict"] in BROKEN} - {row["scene"] for row in exact}
-    return {row["scene"] for row in exact if row["metric"] == metric} | lost - WITHOUT.get(metric, set())
+    broken = {row["scene"] for row in records(run) if row["verdict"] in BROKEN}
+    with_errors = {row["scene"] for row in exact if row["metric"] == metric and (row["scene"] in broken or not math.isnan(row["value"]))}
+    return with_errors | broken - {row["scene"] for row in exact} - WITHOUT.get(metric, set())
 
 
 def named(text, scenes):
@@ -217,6 +222,18 @@ def test_each_claim_is_that_of_the_rows(seed):
             verify_statement(run, METRICS[few[1].lower()], few[2])
         else:
             assert re.match("1 s of motion|No recommendation: it takes 3 scenes", sentence)
+
+
+@pytest.mark.parametrize(("verdict", "tests"), [("measured", 1), ("failed", 3)])
+def test_scene_in_which_an_error_is_undefined_for_every_engine_tests_nothing(verdict, tests):
+    """Such as a flight that is too short to be measured; a bounce that should occur and does not is a failed test."""
+    rows = []
+    for scene, engine in product(("drop-ball", "drop-box-edge", "drop-box-turning"), "ab"):
+        case = {"scene": scene, "engine": engine, "dt": 1e-3, "kind": "truth", "metric": "energy_error", "unit": "1"}
+        error = {"value": 1e-4, "tolerance": 0.0, "verdict": "passed"} if scene == "drop-ball" else {"value": math.nan, "verdict": verdict}
+        rows.append(Measurement(**case, **error))
+    run = Results(as_table(rows), SCENES, ("a", "b"), {}, provenance={"asked": {"within": 0.01}})
+    assert {answer.scenes for answer in conclude(run)} == {tests}
 
 
 def test_scenes_in_which_the_only_engine_broke_down_are_exceptions():

@@ -99,6 +99,15 @@ class Metric:
         """
         return _largest(self._of_each(self.measure, cases).mean(axis=0))
 
+    @np.errstate(all="ignore")
+    def root_mean_square(self, cases: Sequence[Comparison]) -> float:
+        """The root mean square over start phases, of the flight where it is largest: the error of one start, without its sign.
+
+        Raises:
+            Unresolved: The time step is too coarse.
+        """
+        return float(np.sqrt((self._of_each(self.measure, cases) ** 2).mean(axis=0)).max())
+
     def value_or_nan(self, cases: Sequence[Comparison]) -> float:
         """The value of the average; NaN if the time step is too coarse."""
         with suppress(Unresolved):

@@ -30,11 +30,13 @@ WORLDS = (256,)
 """Numbers of worlds in a batch."""
 BATCH_SECONDS = 0.02
 """The smallest wall time of a timing of a batch in free flight [s]."""
-LONGEST_BATCH = 4.0
-"""The largest wall time of a timing of a batch on a floor [s]."""
+LONGEST_RUN, LONGEST_BATCH = 0.05, 4.0
+"""The largest wall time of a run in damped flight that is timed whole, and of one of a batch in damped flight or on a floor [s]."""
 MEMORY_STEPS = 10
 ALIKE, ROUNDING = 1e-3, 64
-"""Largest difference of a batch from a single simulation: a share of how far that has moved, and so many eps of the largest number."""
+"""Largest difference of a batch from a single simulation: a share of how far that has moved, at most its error, and so many eps of the
+largest number.
+"""
 PROCESS = Path("/proc/self")
 LOAD = Path("/proc/loadavg")
 
@@ -49,50 +51,58 @@ def load() -> float:
 def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
     """Wall time per simulated second of the engine's time steps [s/s]; NaN if the state after them is not finite.
 
-    In free flight every step takes the same time: so many are timed that the call is short beside them, beyond the end of the scene if the
-    engine does not break down there. With a floor the time depends on the motion, so whole runs are timed.
+    In flight without damping every step takes the same time: so many are timed that the call is short beside them, beyond the end of the
+    scene if the engine does not break down there. Else the time depends on the motion, so whole runs are timed; but of long damped flights
+    only the first steps.
     """
     timed = partial(_finite, entry.adapter, scene, dt)
     if scene.floor is None:
         with suppress(Diverged):
+            if scene.damping is not None and timed(FIRST_STEPS).stepping * scene.steps(dt) <= LONGEST_RUN * FIRST_STEPS:
+                return time_per_step(timings(lambda: timed(scene.steps(dt)), MOST_RUNS, LONG_ENOUGH)) / dt
             return time_per_step(timings_in_flight(timed, FIRST_STEPS, TIMING_REPEATS, LONG_ENOUGH)) / dt
     with suppress(Diverged):
         return time_per_step(timings(lambda: timed(scene.steps(dt)), MOST_RUNS, LONG_ENOUGH)) / dt
     return math.nan
 
 
-def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], worlds: int) -> tuple[list[float], Breakdown | None]:
+def costs_per_world(
+    entry: EngineEntry, scene: Scenario, steps: Sequence[tuple[float, float]], worlds: int
+) -> tuple[list[float], Breakdown | None]:
     """Wall time per simulated second and world [s/s] of a batch at each time step, as by `cost`, and why the first without one has none.
 
-    NaN if its states are not finite, or after the first steps not those of a single simulation. Whole runs that are too long, judged by
-    their first steps, are not timed; this counts as no failure.
+    NaN if its states are not finite; and at all time steps, if after the first steps at one of them they are not those of a single
+    simulation, whose error is known. Whole runs that are too long, judged by their first steps, are not timed; this counts as no failure.
+
+    Args:
+        entry: The engine.
+        scene: The scene.
+        steps: Each time step [s], and the error of a single simulation at it.
+        worlds: Number of worlds in the batch.
     """
     times: list[float] = []
     failure: Breakdown | None = None
-    for dt in dts:
-        timed, steps = partial(_finite, entry.adapter, [scene] * worlds, dt), scene.steps(dt)
+    for dt, error in steps:
+        timed, count = partial(_finite, entry.adapter, [scene] * worlds, dt), scene.steps(dt)
         times.append(math.nan)
         try:
-            _verify_alike(entry, scene, timed(1).state, time_steps(entry.adapter, scene, dt, 1).state)  # and compile
-            if scene.floor is None:
+            batch, alone = timed(1).state, time_steps(entry.adapter, scene, dt, 1).state  # and compile
+            if not _are_alike(entry, scene, batch, alone, min(error, ALIKE)):  # as of another method
+                return [math.nan] * len(steps), Breakdown("failed", "the states of a batch are not those of a single simulation")
+            if scene.floor is None and scene.damping is None:
                 with suppress(Diverged):
                     times[-1] = time_per_step(timings_in_flight(timed, FIRST_STEPS_OF_A_BATCH, 1, BATCH_SECONDS))
-            if math.isnan(times[-1]) and timed(FIRST_STEPS).stepping * steps <= LONGEST_BATCH * FIRST_STEPS:
-                times[-1] = time_per_step([timed(steps)])
+            if math.isnan(times[-1]) and timed(FIRST_STEPS).stepping * count <= LONGEST_BATCH * FIRST_STEPS:
+                times[-1] = time_per_step([timed(count)])
         except Exception as error:  # whatever an engine raises costs its own batch only
             failure = failure or classify(error)
-    return [per_step / (dt * worlds) for dt, per_step in zip(dts, times, strict=True)], failure
+    return [per_step / (dt * worlds) for (dt, _), per_step in zip(steps, times, strict=True)], failure
 
 
-def _verify_alike(entry: EngineEntry, scene: Scenario, batch: Array, alone: Array) -> None:
-    """Compare the states of a batch, (size, 13), with that of a single simulation, (13,), over how far that has moved.
-
-    Raises:
-        Breakdown: They differ.
-    """
+def _are_alike(entry: EngineEntry, scene: Scenario, batch: Array, alone: Array, share: float) -> bool:
+    """Whether the states of a batch, (size, 13), are that of a single simulation, (13,), but for a share of how far that has moved."""
     rounding = ROUNDING * np.finfo(entry.adapter.precision).eps * np.abs(alone).max()
-    if not np.abs(batch - alone).max() <= ALIKE * np.abs(alone - scene.initial_state).max() + rounding:
-        raise Breakdown("failed", "the states of a batch are not those of a single simulation")
+    return bool(np.abs(batch - alone).max() <= share * np.abs(alone - scene.initial_state).max() + rounding)
 
 
 def _finite(*args: Any) -> TimedSteps:

@@ -13,13 +13,12 @@ from typing import Literal
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.exceptions import short
 from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.running.arguments import MOST_STEPS, EngineEntry
-from dropspin.comparisons.running.driving import Breakdown, divergence, record, verify_accepted
+from dropspin.comparisons.running.driving import Breakdown, classify, divergence, record, verify_accepted
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.start_phases import StartPhase, start_phases
 from dropspin.scenarios import Scenario, truth_for
@@ -43,6 +42,8 @@ WRONG = 0.01
 """The error of a motion, in rad or relative to the distance that it covers, up to which it is not wrong, also if it does not fall."""
 ROWS_OF_MOTION = 65
 SMALL, PATIENCE, PATIENCE_WHILE_LARGE = 1e-6, 2, 6
+LAST = 3
+"""The number of last time steps at which an error that does not fall must be within a tolerance."""
 LARGE_ANGLE = 0.5
 """An angle [rad] above which an error may stay at any number of time steps and still fall at smaller ones: it is at most π."""
 
@@ -92,12 +93,14 @@ def output_interval(scene: Scenario) -> float:
     return min(intervals)
 
 
-def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str], budget: float, processes: EngineProcesses) -> Ladder:
+def errors_over_steps(
+    entry: EngineEntry, scene: Scenario, metrics: Sequence[str], budget: float, processes: EngineProcesses, within: float = 0.0
+) -> Ladder:
     """The errors by the first metric, from the coarsest time step to those at which they stop falling, or to the end of the budget.
 
     The errors by the second metric, that of the motion, must fall too. Otherwise the engine is left out, because it may simulate another
     motion, for which a small error by the first metric has no meaning: Wang's method conserves the energy of a rotation that is wrong. It
-    takes part if its errors by the second metric are undefined.
+    takes part if its errors by the second metric are undefined, or if the two metrics are the same and the errors within a tolerance.
 
     Args:
         entry: The engine.
@@ -105,6 +108,7 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
         metrics: The metric of the error, and that of the motion.
         budget: Processor time for all time steps [s]; the time step at which it is exceeded is the last one.
         processes: The engine's process.
+        within: The tolerance.
     """
     interval = output_interval(scene)
     most = MOST_STEPS if scene.floor is None else MOST_RECORDED
@@ -123,18 +127,25 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
             tried.append((interval / division, [math.nan] * len(metrics)))
             ended, reason, verdict = "failed", run.reason, run.verdict
             break
-        tried.append((interval / division, run[0]))
-        spent += run[1]
-        undefined = run[2] or undefined
+        errors, seconds, why, broken = run
+        tried.append((interval / division, errors))
+        spent += seconds
+        undefined, verdict = why or undefined, broken or verdict
+        if verdict == "timed_out":  # which would cost as much time again
+            ended, reason = "failed", undefined
+            break
         stalled = _stalled([errors[0] for _, errors in tried if np.isfinite(errors[0])])
-        if stalled and not _has_large_angle(metrics, run[0]):
+        if stalled and not _has_large_angle(metrics, errors):
             ended, reason = "error_stopped_falling", f"at the last {stalled} time steps the error fell by less than a fifth each"
             break
         if spent >= budget:
             ended, reason = "budget", f"the budget of {budget:g} s of processor time was spent"
             break
     steps = tuple((dt, errors[0]) for dt, errors in tried)
-    left_out = _left_out(scene, tried, metrics[1], undefined or reason)
+    if verdict is not None and not np.isfinite([error for _, error in steps]).any():
+        return Ladder(entry.label, (), "not_run", undefined or reason, undefined or reason, verdict)
+    is_within = metrics[0] == metrics[1] and all(error <= within for _, error in steps[-LAST:])
+    left_out = "" if is_within else _left_out(scene, tried, metrics[1], undefined or reason)
     return Ladder(entry.label, steps, ended, reason, left_out, verdict, undefined)
 
 
@@ -170,8 +181,10 @@ def _covered(scene: Scenario) -> float:
     return max(scene.body.size, float(np.linalg.norm(position - position[0], axis=1).max()))
 
 
-def _errors(entry: EngineEntry, scene: Scenario, dt: float, division: int, metrics: Sequence[str]) -> tuple[list[float], float, str]:
-    """Absolute values of metrics at a time step, NaN where undefined, their processor time [s], and why the first is undefined."""
+def _errors(
+    entry: EngineEntry, scene: Scenario, dt: float, division: int, metrics: Sequence[str]
+) -> tuple[list[float], float, str, Verdict | None]:
+    """Sizes of metrics at a time step, NaN where undefined, their processor time [s], and what broke or left the first undefined."""
     start = processor_time()
     verify_accepted(entry.adapter, scene)
     truth, every = truth_for(scene), division if scene.floor is None else 1
@@ -181,18 +194,19 @@ def _errors(entry: EngineEntry, scene: Scenario, dt: float, division: int, metri
         motions = [record(entry.adapter, phase.scene, dt, every).motion for phase in phases]
         cases = [Comparison.with_truth(phase.scene, motion, phase.truth) for phase, motion in zip(phases, motions, strict=True)]
         errors, [why, *_] = map(list, zip(*(_error(metric, cases) for metric in metrics), strict=True))
-    except Diverged as error:
-        why = short(str(error))
+    except Exception as error:  # the engine may fail at coarse time steps alone
+        failure = classify(error)
+        return errors, processor_time() - start, failure.reason, None if failure.verdict == "diverged" else failure.verdict
     if np.isfinite(errors[0]):
-        return errors, processor_time() - start, ""
+        return errors, processor_time() - start, "", None
     why = next((broken.reason for broken in map(divergence, motions) if broken), why)
-    return errors, processor_time() - start, why
+    return errors, processor_time() - start, why, None
 
 
 def _error(metric: str, cases: Sequence[Comparison]) -> tuple[float, str]:
-    """The absolute value of a metric; NaN and why if it is undefined."""
+    """The size of a metric, with a floor the root mean square over start phases; NaN and why if it is undefined."""
     try:
-        error = abs(METRICS[metric].value(cases))
+        error = METRICS[metric].root_mean_square(cases)
     except Unresolved as unresolved:
         return math.nan, short(str(unresolved))
     return (error, "") if np.isfinite(error) else (math.nan, "the metric has no value")

@@ -28,6 +28,10 @@ LEVEL = 1.25
 """Two costs count as equal if their ratio is below this, or if their order differs between rounds."""
 
 
+NEAR = 0.249
+"""Share of a time step down to which smaller ones count with it: a quarter, with the rounding of a division."""
+
+
 def spread(costs: Array) -> float:
     """How far timings of the same work differ: the median over the least, 1 without other load on the machine."""
     return float(np.median(costs) / np.min(costs))
@@ -167,11 +171,13 @@ class TradeOff:
         return min(batched, key=lambda point: point.costs_per_world[worlds], default=None)
 
     def reached(self, point: CostPoint) -> float:
-        """The largest error of an engine at a time step and at all smaller ones; infinite if one of them is not finite.
+        """The largest error of an engine at a time step and at those down to a quarter of it; infinite if one of them is not finite.
 
-        The error at one time step may be small by chance, because it changes sign near this step.
+        The error at one time step may be small by chance, because it changes sign near this step. It may grow at much smaller time steps,
+        by rounding, which nobody uses in place of this one.
         """
-        errors = [error for ladder in self.ladders if ladder.engine == point.engine for dt, error in ladder.completed if dt <= point.dt]
+        mine = [step for ladder in self.ladders if ladder.engine == point.engine for step in ladder.completed]
+        errors = [error for dt, error in mine if NEAR * point.dt <= dt <= point.dt]
         return max(errors) if np.isfinite(errors).all() else math.inf
 
     def _within(self, within: float) -> list[CostPoint]:

@@ -65,6 +65,7 @@ def tradeoff(
     metric: str | None = None,
     *,
     budget: float = BUDGET,
+    within: float = 0.0,
     worlds: Sequence[int] = WORLDS,
     on_progress: OnProgress | None = None,
     resources: ResourceLimits = FIVE_MINUTES,
@@ -80,6 +81,7 @@ def tradeoff(
             if the body rotates, else position.
         budget: Processor time for measuring the errors of each engine at all time steps [s]; once it is used up, no smaller time step is
             tried.
+        within: The largest tolerance that is of interest: an engine whose errors are within it takes part, also if they do not fall.
         worlds: The numbers of worlds in the batches to time, for engines that step many worlds together.
         on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1, in any
             thread, but in one at a time.
@@ -115,7 +117,7 @@ def tradeoff(
 
     def errors(entry: EngineEntry, processes: EngineProcesses, report_errors: Callable[[str], None]) -> Ladder:
         report_errors(f"errors of {entry.label}")
-        return errors_over_steps(entry, scene, [chosen, of_the_motion], budget, processes)
+        return errors_over_steps(entry, scene, [chosen, of_the_motion], budget, processes, within)
 
     with EngineProcesses(resources) as processes:
         processes.start([entry for entry in entries.values() if not entry.absence])
@@ -168,9 +170,9 @@ def _with_costs(
         for entry, ladder in ladders:
             # A time step at which a single simulation diverges until it is timed is no fault of the batch.
             rows = [row for row, (owner, _, _) in enumerate(steps) if owner is entry and np.isfinite(costs[row]).all()]
-            dts = [steps[row][1] for row in rows]
+            errors = [(dt, error) for _, dt, error in map(steps.__getitem__, rows)]
             for column, size in enumerate(worlds):
-                found = processes.call(entry, costs_per_world, scene, dts, size)
+                found = processes.call(entry, costs_per_world, scene, errors, size)
                 batches[rows, column, number], failure = (math.nan, found) if isinstance(found, Breakdown) else found
                 if failure is not None:
                     failures.setdefault(entry.label, failure)

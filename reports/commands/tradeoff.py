@@ -66,7 +66,7 @@ def tradeoff_command(scenes: tuple[str, ...], within: tuple[float, ...], output:
         for scene in loaded:
             try:
                 with share_bar(scene.name) as on_progress:
-                    results.append(tradeoff(scene, **options, on_progress=on_progress))
+                    results.append(tradeoff(scene, **options, within=max(within), on_progress=on_progress))
                 verdicts += [ladder.verdict for ladder in results[-1].ladders]
             except NotCompared as error:
                 verdicts += [ladder.verdict for ladder in error.ladders]

@@ -124,11 +124,11 @@ def sentences(study: TradeOff, within: Sequence[float]) -> list[str]:
 
 
 def _undefined(study: TradeOff) -> list[str]:
-    """Sentences on the engines that are compared and diverge, or have no error, at time steps below one at which they have an error."""
+    """Sentences on the engines that are compared and have no error at time steps below one at which they have one, or that fail at any."""
     causes: dict[str, list[str]] = {}
     for ladder in study.ladders:
         coarsest = max((dt for dt, error in ladder.completed if math.isfinite(error)), default=0.0)
-        without = [dt for dt, error in ladder.completed if not math.isfinite(error) and dt < coarsest]
+        without = [dt for dt, error in ladder.completed if not math.isfinite(error) and (ladder.verdict or dt < coarsest)]
         if without and not ladder.left_out:
             steps = f"{len(without)} of {counted(len(ladder.completed), 'time step', 'time steps')}, down to {in_ms(without[-1])}"
             causes.setdefault(f"No error at {steps}, because {ladder.undefined}", []).append(ladder.engine)
@@ -145,8 +145,8 @@ def _recommendation(study: TradeOff, tolerance: float) -> str:
         ladder = next(ladder for ladder in study.ladders if ladder.engine == nearest.engine)
         error = with_unit(formatted(nearest.error), unit)
         if nearest.error <= tolerance:
-            none = "no tested configuration is within this tolerance at its time step and at all smaller ones"
-            larger = "a larger one" if any(value > tolerance for dt, value in ladder.completed if dt < nearest.dt) else "none"
+            none = "no tested configuration is within this tolerance at its time step and at those down to a quarter of it"
+            larger = "a larger one" if math.isfinite(study.reached(nearest)) else "none"
             outcome = f"{none}; {_named(nearest)} has an error of {error}, but {larger} at a smaller time step"
         else:
             outcome = f"no tested configuration reaches this tolerance; the most accurate is {_named(nearest)} with an error of {error}"
@@ -157,7 +157,7 @@ def _recommendation(study: TradeOff, tolerance: float) -> str:
         others = [point for point in study.points if point.engine != advice.best.engine]
         reach = "reaches this tolerance"
         if any(point.error <= tolerance for point in others):
-            reach = "is within this tolerance at a tested time step and at all smaller ones"
+            reach = "is within this tolerance at a tested time step and at those down to a quarter of it"
         sentence += f"; no other engine that was compared {reach}." if others else "."
     elif not advice.level:
         sentence += f"; the next best, {_named(advice.next_best)}, takes {_times(ratio)} as long."

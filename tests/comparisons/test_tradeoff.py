@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from support.accuracy_options import InnerStep
 from support.engines import Exact, ExactSimulation, Together
 
@@ -22,6 +23,7 @@ from dropspin.comparisons.tradeoff import ladder as ladder_module
 from dropspin.comparisons.tradeoff.ladder import DIVISIONS, Ladder, output_interval
 from dropspin.comparisons.tradeoff.pareto import CostPoint, TradeOff, spread
 from dropspin.comparisons.tradeoff.study import tradeoff
+from dropspin.reports.stories.tradeoff import sentences
 from dropspin.scenarios import DropspinError, load
 
 SPIN = load("spin-asymmetric")
@@ -90,6 +92,15 @@ def test_coarse_step_is_not_recommended_if_a_finer_one_exceeds_the_tolerance():
     """Its error is small by chance, where it crosses 0."""
     found = made(("a", 0.4, 1e-5, [1, 1, 1]), ("a", 0.2, 1e-2, [2, 2, 2]), ("a", 0.1, 1e-4, [4, 4, 4]))
     assert found.recommendation(1e-3).best.dt == 0.1
+
+
+def test_error_that_grows_by_rounding_at_much_finer_steps_does_not_count():
+    """In single precision; four times as fine is not much finer."""
+    steps = [(0.4 / 2**number, error) for number, error in enumerate([1e-4, 1e-5, 1e-6, 1e-4, 1e-2, 1e-1])]
+    found = made(*(("single", dt, error, [1 / dt] * 3) for dt, error in steps))
+    assert found.recommendation(1e-3).best.dt == 0.4
+    assert [found.reached(point) for point in found.points] == [1e-4, 1e-4, 1e-2, 1e-1, 1e-1, 1e-1]
+    assert [point.dt for point in found.pareto_front] == [0.4]
 
 
 @pytest.mark.parametrize(("ended", "recommended"), [("budget", None), ("failed", 0.4)])
@@ -182,7 +193,40 @@ def test_cost_of_a_step_in_flight_is_without_that_of_the_call(monkeypatch, dt):
     monkeypatch.setattr(timing.time, "perf_counter", lambda: CostlyCalls.clock)
     entry = EngineEntry("costly-calls", CostlyCalls())
     assert costs.cost(entry, SPIN, dt) == pytest.approx(STEP / dt, rel=1e-9)
-    assert costs.costs_per_world(entry, SPIN, [dt, 2 * dt], 4) == (pytest.approx([STEP / dt, STEP / (2 * dt)], rel=1e-9), None)
+    assert costs.costs_per_world(entry, SPIN, [(dt, 1.0), (2 * dt, 1.0)], 4) == (
+        pytest.approx([STEP / dt, STEP / (2 * dt)], rel=1e-9),
+        None,
+    )
+
+
+class Settling(CostlyCalls):
+    """Its first 40 steps take a hundred times as long as the later ones, as of an engine that divides steps while the body turns fast."""
+
+    name = "settling"
+
+    def prepare(self, scene, dt):
+        made = Exact.prepare(self, scene, dt)
+        advance = made.advance
+
+        def passing(steps):
+            first = made._step
+            advance(steps)
+            self.pass_time(sum(100 if step < 40 else 1 for step in range(first, first + steps)))
+
+        made.advance = passing
+        return made
+
+
+def test_damped_flight_is_timed_whole_unless_that_takes_long(monkeypatch):
+    """Beyond its end the body is at rest, where a step may cost less; of a long run, so many steps are timed that the call is short."""
+    monkeypatch.setattr(timing.time, "perf_counter", lambda: CostlyCalls.clock)
+    damped, entry = load("spin-damped"), EngineEntry("settling", Settling())
+    dt = damped.duration / 100
+    monkeypatch.setattr(costs, "LONGEST_RUN", 1.0)
+    whole = (38 * 100 + 62 - 100) / 99  # of the 100 steps after the first two, without the call and its step
+    assert costs.cost(entry, damped, dt) == pytest.approx(whole * STEP / dt, rel=1e-9)
+    monkeypatch.setattr(costs, "LONGEST_RUN", 1e-3)
+    assert costs.cost(entry, damped, dt) < 0.3 * whole * STEP / dt
 
 
 class SlowStart(CostlyCalls):
@@ -212,7 +256,7 @@ def test_cost_per_world_of_an_engine_that_divides_its_steps(monkeypatch):
     """It is the same at all steps, and timed at each: it is not derived from that at the smallest."""
     monkeypatch.setattr(timing.time, "perf_counter", lambda: CostlyCalls.clock)
     entry = EngineEntry("substeps", Substeps())
-    assert costs.costs_per_world(entry, SPIN, [1e-2, 1e-3], 4) == (pytest.approx([STEP / 1e-3] * 2, rel=1e-9), None)
+    assert costs.costs_per_world(entry, SPIN, [(1e-2, 1.0), (1e-3, 1.0)], 4) == (pytest.approx([STEP / 1e-3] * 2, rel=1e-9), None)
 
 
 class Idle(Together):
@@ -247,7 +291,7 @@ class NotFinite(Together):
 
     def states(self):
         states = super().states()
-        states[-1] *= np.nan if self._simulations[0]._step > 300 else 1.0
+        states[-1] *= np.nan if self._simulations[0]._step > 60 else 1.0
         return states
 
 
@@ -268,12 +312,30 @@ def test_batch_without_a_cost_has_the_reason(batch, are_timed, verdict, reason):
         return batch([self.prepare(member, dt) for member in members])
 
     engine = type("Batched", (Exact,), {"name": "batched", "prepare_batch": prepare_batch})()
-    times, failure = costs.costs_per_world(EngineEntry("batched", engine), SPIN, [1e-2, 2e-2], 4)
+    times, failure = costs.costs_per_world(EngineEntry("batched", engine), SPIN, [(1e-2, 1.0), (2e-2, 1.0)], 4)
     assert np.isfinite(times).tolist() == are_timed
     ladder = study._with_failures(Ladder("batched", (), "budget", ""), True, failure)
     assert (ladder.verdict, ladder.no_batch_cost) == (verdict, reason)
-    _, without = costs.costs_per_world(EngineEntry("exact", Exact()), SPIN, [1e-2], 4)
+    _, without = costs.costs_per_world(EngineEntry("exact", Exact()), SPIN, [(1e-2, 1.0)], 4)
     assert study._with_failures(ladder, True, without) == ladder
+
+
+def test_batch_that_errs_more_than_a_single_simulation_has_no_cost():
+    """Where the difference of its first steps is 1e-4 of their motion; at no time step, as it is another method or precision."""
+
+    def prepare_batch(self, members, dt):
+        rows = [
+            ExactSimulation(member, dt, lambda row, time: row * (1.0 + 1e-4 * min(time, 1.0) * (np.arange(13) > 9))) for member in members
+        ]
+        return Together(rows)
+
+    entry = EngineEntry("other", type("Other", (Exact,), {"name": "other", "prepare_batch": prepare_batch})())
+    times, failure = costs.costs_per_world(entry, SPIN, [(1.0, 1e-2), (0.5, 1e-3)], 4)
+    assert np.isfinite(times).all()
+    assert failure is None
+    times, failure = costs.costs_per_world(entry, SPIN, [(1.0, 1e-2), (0.5, 1e-6)], 4)
+    assert np.isnan(times).all()
+    assert failure.reason == "the states of a batch are not those of a single simulation"
 
 
 @pytest.fixture(scope="module")
@@ -410,6 +472,11 @@ class Never(Exact):
 SHORT = SPIN.model_copy(update={"duration": 4.0})
 
 
+@pytest.fixture
+def _processor_time_of_the_steps(monkeypatch):
+    monkeypatch.setattr(ladder_module, "processor_time", lambda: Clock.now)
+
+
 class NoNumbers(Exact):
     """Has no numbers at steps below 50 ms, where it is right above."""
 
@@ -427,6 +494,55 @@ def test_time_steps_without_an_error_have_the_reason(engine, why, monkeypatch):
     assert ladder.undefined.startswith(why)
     assert ladder.verdict is None
     assert (f": {why}" in ladder.left_out) == isinstance(engine, Never)
+
+
+class Raising(FirstOrder):
+    """Raises an exception of its own at steps above `largest`."""
+
+    name = "raising"
+    largest = 0.3
+
+    def prepare(self, scene, dt):
+        if dt > self.largest:
+            raise RuntimeError("the step is too large")
+        return super().prepare(scene, dt)
+
+
+@pytest.mark.usefixtures("_processor_time_of_the_steps")
+def test_engine_that_raises_at_coarse_steps_alone_is_compared(monkeypatch):
+    """With the exit code of an engine that breaks down, and the steps in a sentence; one that always raises was not run."""
+    monkeypatch.setattr(ladder_module, "MOST_STEPS", 100)
+    always = type("Always", (Raising,), {"name": "always", "largest": 0.0})()
+    found = tradeoff(SHORT, [Raising(), always])
+    raising, failing = found.ladders
+    assert [np.isnan(error) for dt, error in raising.steps] == [dt > 0.3 for dt, _ in raising.steps]
+    assert raising.steps[0][0] > 0.3 > raising.steps[-1][0]
+    assert (raising.left_out, raising.verdict, raising.undefined) == ("", "crashed", "RuntimeError: the step is too large")
+    assert (failing.ended, failing.verdict, failing.left_out) == ("not_run", "crashed", "RuntimeError: the step is too large")
+    [sentence] = [text for text in sentences(found, []) if "too large: raising" in text]
+    assert sentence.startswith("No error at ")
+
+
+def test_engine_within_a_tolerance_is_compared_though_its_error_does_not_fall():
+    """An error of 0.05 rad; only if the tolerance is about the motion."""
+
+    class Tilted(Exact):
+        name = "tilted"
+
+        def prepare(self, scene, dt):
+            return ExactSimulation(scene, dt, lambda row, time: row if time == 0.0 else tilted(row))
+
+    def tilted(row):
+        return np.concatenate([row[:3], (Rotation.from_quat(row[3:7]) * Rotation.from_rotvec([0.05, 0.0, 0.0])).as_quat(), row[7:]])
+
+    def left_out(metrics, within):
+        with EngineProcesses(FIVE_MINUTES) as processes:
+            entry = EngineEntry("tilted", Tilted())
+            return ladder_module.errors_over_steps(entry, SHORT, metrics, 1.0, processes, within).left_out
+
+    assert left_out(["orientation_error"] * 2, 0.06) == ""
+    assert left_out(["orientation_error"] * 2, 0.04).startswith("no convergence observed")
+    assert left_out(["position_error", "orientation_error"], 0.06).startswith("no convergence observed")
 
 
 class Growing(Exact):
@@ -457,11 +573,6 @@ def test_batch_that_diverges_where_a_single_simulation_does_has_no_fault(monkeyp
     assert (ladder.verdict, ladder.no_batch_cost) == (None, "")
     assert [dt for dt, _ in ladder.steps][1:] == [point.dt for point in found.points if 2 in point.costs_per_world]
     assert ladder.steps[0][0] > 0.3 > ladder.steps[1][0]
-
-
-@pytest.fixture
-def _processor_time_of_the_steps(monkeypatch):
-    monkeypatch.setattr(ladder_module, "processor_time", lambda: Clock.now)
 
 
 def test_angles_that_stay_large_at_coarse_steps_may_fall_at_finer_ones():

@@ -362,3 +362,17 @@ def test_energy_after_an_impact_counts_though_the_flight_before_is_much_longer()
     states[(exact.t > first) & (exact.t < second), 7:10] *= 1.5
     case = Comparison.with_truth(scene, Trajectory.from_states(exact.t, states, 0.0), truth)
     assert METRICS["energy_error"].value([case]) > 0.005
+
+
+def test_root_mean_square_over_start_phases_has_no_sign():
+    """Two flights as far too high as too low have the mean 0, of which no single run knows."""
+    scene, motion = exact_motion("drop-ball")
+    metric, truth, cases = METRICS["bounce_height_error"], truth_for(scene), []
+    for factor in (1.02, 0.98):
+        height = motion.position.copy()
+        height[motion.t > truth.events[0].time, 1] *= factor
+        cases.append(Comparison.with_truth(scene, exact_motion("drop-ball", position=height)[1], truth))
+    single = [metric.root_mean_square([case]) for case in cases]
+    assert single == pytest.approx([abs(metric.value([case])) for case in cases])
+    assert abs(metric.value(cases)) < 0.05 * min(single)
+    assert metric.root_mean_square(cases) == pytest.approx(np.sqrt(np.mean(np.square(single))))

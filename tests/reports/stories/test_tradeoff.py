@@ -92,7 +92,7 @@ def test_error_that_is_small_at_a_coarse_step_alone_is_no_recommendation(found):
     crossing = Ladder("accurate", ((0.033, 5e-4), (0.01, 3e-3)), "budget", SPENT)
     points = tuple(CostPoint("accurate", dt, error, np.full(3, 1e-6 / dt), {}) for dt, error in crossing.steps)
     [sentence] = tradeoff.sentences(TradeOff(found.scene, found.metric, points, (crossing,)), [1e-3])[:1]
-    none = "no tested configuration is within this tolerance at its time step and at all smaller ones"
+    none = "no tested configuration is within this tolerance at its time step and at those down to a quarter of it"
     assert f"{none}; accurate at 33 ms has an error of 5.00e-04 rad, but a larger one at a smaller time step." in sentence
 
 

@@ -133,7 +133,7 @@ def _seen(scene: Scenario, change: Callable[[tuple[float, ...]], tuple[float, ..
 
 
 def turned(scene: Scenario, rotation: Array) -> Scenario:
-    """The scene, gravity and walls included, turned about the vertical by a rotation."""
+    """The scene, gravity and walls included, turned by a rotation; it is about the vertical if there is a floor."""
     started = scene.starting_at(turned_states(scene.initial_state, rotation))
     return changed(started, scene.duration, **_seen(scene, lambda vector: tuple(map(float, rotate(rotation, np.array(vector))))))
 

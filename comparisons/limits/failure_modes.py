@@ -31,11 +31,10 @@ POSITION_OFF = 0.5  # of the distance that the exact solution covers, or of the 
 BLOWN_UP = 1e6  # times the scene's energy
 DEEPER = 1e-3  # of the body's size; smaller distances are ignored
 NEVER_RESTS = 1.5  # times the speed that gravity adds in a step, which a resting body may have between two solutions
-SAME_SPEED = 1e-15  # relative; speeds closer than this are equal to the last digit, also if they are norms
+SAME_SPEED = 4.5  # eps; speeds closer than this are equal to the last digit, also if they are norms
 HELD = 3  # rows in which a clamped speed is equal to the last digit
 SUDDEN = 1e-6  # relative; the least change of a speed from row to row just before a clamp; one that settles changes less
-same_speed = partial(math.isclose, rel_tol=1e-9)
-"""Whether speeds from two initial states are equal."""
+SAME_STARTS = 1e-9  # relative; or twice as many eps: speeds from two initial states that are equal
 
 
 class Diagnosis(NamedTuple):
@@ -218,8 +217,9 @@ class HeldSpeed(NamedTuple):
     components: tuple[float, ...]
     norm: float
 
-    def shared(self, other: "HeldSpeed") -> float:
+    def shared(self, other: "HeldSpeed", eps: float) -> float:
         """The value at which this speed and that from another initial state are clamped; NaN if they are not."""
+        same_speed = partial(math.isclose, rel_tol=max(SAME_STARTS, 2.0 * SAME_SPEED * eps))
         components = [value for value in self.components if any(same_speed(value, of_other) for of_other in other.components)]
         most = max(components, default=math.nan)
         if not same_speed(self.norm, other.norm):
@@ -229,23 +229,23 @@ class HeldSpeed(NamedTuple):
         return most if are_components else self.norm
 
 
-def held_speeds(motion: Trajectory) -> dict[str, HeldSpeed]:
-    """The velocity and angular velocity of which the length or a component is possibly clamped."""
+def held_speeds(motion: Trajectory, eps: float) -> dict[str, HeldSpeed]:
+    """The velocity and angular velocity of which the length or a component is possibly clamped; `eps` is that of the engine."""
     held = {}
     for name in ("velocity", "angular_velocity"):
         components = np.abs(getattr(motion, name))
         values = []
         for sizes in (*components.T, length(components)):
             largest = float(sizes[1:].max())
-            values.append(largest if largest > 0.0 and _is_held(sizes, largest) else math.nan)
+            values.append(largest if largest > 0.0 and _is_held(sizes, largest, eps) else math.nan)
         if not np.isnan(values).all():
             held[name] = HeldSpeed(tuple(values[:3]), values[3])
     return held
 
 
-def _is_held(sizes: Array, largest: float) -> bool:
+def _is_held(sizes: Array, largest: float, eps: float) -> bool:
     """Whether a component or norm that varied, or was larger initially, stays at its largest value for some rows."""
-    held = np.abs(sizes - largest) <= SAME_SPEED * largest
+    held = np.abs(sizes - largest) <= SAME_SPEED * eps * largest
     if sizes[0] > largest * (1.0 + SUDDEN) and held[1]:
         return True
     in_a_row = np.logical_and.reduce([held[shift : len(held) - HELD + 1 + shift] for shift in range(HELD)])
@@ -253,11 +253,11 @@ def _is_held(sizes: Array, largest: float) -> bool:
     return bool(in_a_row.any()) and first > 1 and abs(sizes[first - 1] - sizes[first - 2]) > SUDDEN * largest
 
 
-def clamped(motion: Trajectory, other: Trajectory) -> list[Diagnosis]:
+def clamped(motion: Trajectory, other: Trajectory, eps: float) -> list[Diagnosis]:
     """Speeds that are possibly clamped and are equal, to the last digit, from two different initial states."""
     units = {"velocity": "m/s", "angular_velocity": "rad/s"}
-    first, second = held_speeds(motion), held_speeds(other)
-    values = {name: first[name].shared(second[name]) for name in first.keys() & second.keys()}
+    first, second = held_speeds(motion, eps), held_speeds(other, eps)
+    values = {name: first[name].shared(second[name], eps) for name in first.keys() & second.keys()}
     return [
         Diagnosis("clamped", f"{name} clamped", values[name], f"{name.replace('_', ' ')} is clamped at {values[name]:.6g} {unit}")
         for name, unit in units.items()

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -121,18 +122,25 @@ class Runner:
     def _of_motions(self, motions: Sequence[ExtendedMotion]) -> Diagnosis:
         return worst([*(diagnose(motion, self.within) for motion in motions), *self._clamps(motions[0])])
 
+    @cached_property
+    def _eps(self) -> float:
+        """The precision of the engine, which is not known outside its process."""
+        found = self.processes.call(self.entry, _eps_of)
+        return float(np.finfo(float).eps) if isinstance(found, Breakdown) else found
+
     def _clamps(self, motion: ExtendedMotion) -> list[Diagnosis]:
         """Speeds that are clamped: they are cut off, and have the same value from another initial state."""
         scene = motion.scene
         stays = scene.floor is not None and not scene.starts_above_floor and not any(scene.start.velocity)
-        if motion.whole.first_bad_row is not None or (stays and not any(scene.start.angular_velocity)) or not held_speeds(motion.whole):
+        is_still = stays and not any(scene.start.angular_velocity)
+        if motion.whole.first_bad_row is not None or is_still or not held_speeds(motion.whole, self._eps):
             return []
         state = scene.initial_state
         state[RATES] *= OTHER_START
         state[1] += (OTHER_START - 1.0) * (scene.clearance if scene.floor is not None else 0.0)
         other = scene.starting_at(state)
         motions = self._record([other], motion.dt)
-        return [] if isinstance(motions, Breakdown) else clamped(motion.whole, motions[0])
+        return [] if isinstance(motions, Breakdown) else clamped(motion.whole, motions[0], self._eps)
 
     def _dependence(self, axis: Axis, value: float, nominal: Trajectory, moved: Scenario, other: Trajectory) -> Diagnosis:
         """Whether the motion of a scaled scene equals the nominal one in its units, up to the end of the exact solution."""
@@ -161,6 +169,10 @@ def _recorded(entry: EngineEntry, scenes: Sequence[Scenario], dt: float, extend:
         extra = max(0, FEWEST_STEPS_WITHOUT_GRAVITY - steps) if extend and scene.gravity is None else 0
         motions.append(record(entry.adapter, scene, dt, max(1, -(-steps // MOST_ROWS)), extra_steps=extra).motion)
     return motions
+
+
+def _eps_of(entry: EngineEntry) -> float:
+    return float(np.finfo(entry.adapter.precision).eps)
 
 
 def _without_motion(breakdown: Breakdown) -> Diagnosis:

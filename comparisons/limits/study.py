@@ -7,7 +7,7 @@ diagnoses so far, so the scan is a loop.
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import groupby, pairwise, product, takewhile
+from itertools import groupby, pairwise, product
 from typing import Annotated
 
 from pydantic import Field, PlainSerializer, PlainValidator
@@ -114,21 +114,27 @@ class LimitsStudy:
     left_out: dict[str, str]
     refinements: dict[str, tuple[ScanPoint, ...]]
 
+    def step_ranges(self, engine: str) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+        """The tested time steps [s] from and up to which an engine is accurate, and stable; None if there are none.
+
+        They begin with the smallest one, or, if the engine is accurate or stable at the nominal one, below this where that begins: at
+        smaller ones errors may grow by rounding.
+        """
+        nominal = next((scan.base for scan in self.scans if scan.axis.name == "step" and scan.engine == engine), math.nan)
+        points = self.steps(engine)
+        return _range(points, ACCURATE, nominal), _range(points, STABLE, nominal)
+
     def steps(self, engine: str) -> tuple[ScanPoint, ...]:
         """The failure mode of an engine at each tested time step, in the order of the time steps."""
         scanned = (scan.points for scan in self.scans if scan.axis.name == "step" and scan.engine == engine)
         return next(scanned, tuple(reversed(self.refinements.get(engine, ()))))
 
-    def largest_steps(self, engine: str) -> tuple[float | None, float | None]:
-        """The largest tested time step up to which an engine is accurate, and that up to which it is stable [s]; None if there is none."""
-        points = self.steps(engine)
-        return _last_in_a_row(points, ACCURATE), _last_in_a_row(points, STABLE)
 
-
-def _last_in_a_row(points: Sequence[ScanPoint], allowed: Sequence[str]) -> float | None:
-    """The last value of the initial sequence of points whose modes are allowed."""
-    values = [point.value for point in takewhile(lambda point: point.mode in allowed, points)]
-    return values[-1] if values else None
+def _range(points: Sequence[ScanPoint], allowed: Sequence[str], nominal: float) -> tuple[float, float] | None:
+    """The first and the last value of the points in a row whose modes are allowed, around the nominal one or else from the first on."""
+    rows = [[point.value for point in row] for is_allowed, row in groupby(points, lambda point: point.mode in allowed) if is_allowed]
+    found = next((row for row in rows if nominal in row), rows[0] if rows and rows[0][0] == points[0].value else None)
+    return None if found is None else (found[0], found[-1])
 
 
 def find_limits(

@@ -49,11 +49,9 @@ def _has_no_edges(scene: Scenario) -> bool:
     return scene.floor is None or scene.floor.half_extents is None
 
 
-def _turned_by(name: str, angle: float) -> Symmetry:
-    rotation = about(UP, np.array(angle))
-    return Symmetry(
-        name, lambda scene: turned(scene, rotation), lambda t, states: turned_states(states, conjugate(rotation)), _has_no_edges
-    )
+def _turned_by(name: str, angle: float, axis: Array = UP, applies: Callable[[Scenario], bool] = _has_no_edges) -> Symmetry:
+    rotation = about(axis, np.array(angle))
+    return Symmetry(name, lambda scene: turned(scene, rotation), lambda t, states: turned_states(states, conjugate(rotation)), applies)
 
 
 def _seen_from(name: str, distance: float, speed: float = 0.0) -> Symmetry:
@@ -77,6 +75,7 @@ SYMMETRIES = {
     for symmetry in (
         _turned_by("turned by 90°", 0.5 * math.pi),
         _turned_by("turned by 1 rad", 1.0),
+        _turned_by("tilted by 1 rad", 1.0, AWAY, lambda scene: scene.floor is None),
         Symmetry("mirrored", mirrored, lambda t, states: REFLECTED * states),
         Symmetry(
             "other body axes", with_next_axes, lambda t, states: with_previous_axes(states), lambda scene: not scene.body.has_own_axis

@@ -24,7 +24,7 @@ from dropspin.comparisons.results.table import Case, Measurement, as_table
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.comparisons.running.perturbed_starts import PERTURBATION
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.state import Array
+from dropspin.scenarios.state import POSITION, VELOCITY, Array
 
 Effects = Callable[[], list[Array]]
 """A function that runs an engine from perturbed starts and returns the differences from its motion, each of shape (n,)."""
@@ -93,7 +93,7 @@ def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Eff
         effects: The function that measures effects of rounding; None if it has none.
         precision: Of the engine's states.
         away: How much farther from the origin a translation moves the start, over the size of the body. An engine with sub-steps rounds its
-            position there more often than once in a step.
+            position there more often than once in a step; the rotation depends on the position only if there is a floor.
     """
     of_pairs = [differences(scene, *pair) for pair in pairs]
     difference: Array = np.max(of_pairs, axis=0)
@@ -112,11 +112,20 @@ def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Eff
     first = int(beyond[0])
     # What perturbations explain does not count, even if it is large.
     unexplained = float(difference[beyond].max())
-    if unexplained > MATTERS and (difference <= allowed + 0.5 * eps * away * SUB_STEPS * steps).all():
+    far: Array = allowed + 0.5 * eps * away * SUB_STEPS * steps
+    if unexplained > MATTERS and (difference <= far).all() and (scene.floor is not None or _turn_alike(scene, pairs, allowed)):
         return replace(none, status="rounding", difference=largest)
     status: Status = "nearly kept" if unexplained <= MATTERS else "lost"
     motions = pairs[int(np.argmax([values.max() for values in of_pairs]))] if status == "lost" else None
     return replace(none, status=status, difference=unexplained, step=first, time=first * dt, motions=motions)
+
+
+def _turn_alike(scene: Scenario, pairs: Pairs, allowed: Array) -> bool:
+    """Whether orientations and spins differ by no more than is allowed: without a floor, no rounding of a position changes them."""
+    moved = [second.copy() for _, second in pairs]
+    for (first, _), states in zip(pairs, moved, strict=True):
+        states[:, POSITION], states[:, VELOCITY] = first[:, POSITION], first[:, VELOCITY]
+    return all((differences(scene, first, states) <= allowed).all() for (first, _), states in zip(pairs, moved, strict=True))
 
 
 def rounding(steps: Array, precision: type) -> Array:

@@ -70,16 +70,18 @@ def step_rows(studies: Sequence[LimitsStudy]) -> Rows:
         scene = study.scene
         spin = float(np.linalg.norm(scene.start.angular_velocity)) if scene.floor is None else 0.0
         for engine in dict.fromkeys(scan.engine for scan in study.scans if scan.axis.name == "step"):
-            accurate, stable = (_largest(dt, study.steps(engine), spin) for dt in study.largest_steps(engine))
+            accurate, stable = (_largest(steps, study.steps(engine), spin) for steps in study.step_ranges(engine))
             rows.append({"scene": scene.name, "engine": engine, "accurate up to": accurate, "stable up to": stable})
     return rows
 
 
-def _largest(dt: float | None, tried: Sequence[ScanPoint], spin: float) -> str:
-    """The largest time step that meets a condition, or, if none does, the smallest tested one with its failure mode."""
-    if dt is None:
+def _largest(steps: tuple[float, float] | None, tried: Sequence[ScanPoint], spin: float) -> str:
+    """The largest of the time steps that meet a condition, or, if there are none, the smallest tested one with its failure mode."""
+    if steps is None:
         return f"{_mode(tried[0])} at {duration(tried[0].value)}, the smallest tested"
+    smallest, dt = steps
     turn = f" ({spin * dt:.2g} rad per step)" if spin else ""
+    turn += f", from {duration(smallest)} on" if smallest > tried[0].value else ""
     return duration(dt) + turn + (", the largest tested" if dt == tried[-1].value else "")
 
 

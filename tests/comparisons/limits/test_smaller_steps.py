@@ -50,7 +50,7 @@ def test_smaller_steps_are_part_of_the_scan_of_steps():
     steps = found.steps("turned-0-mrad")
     assert [point.value for point in steps] == sorted(point.value for point in steps)
     assert {point.value for point in found.refinements["turned-0-mrad"]} <= {point.value for point in steps}
-    accurate, _ = found.largest_steps("turned-0-mrad")
+    (_, accurate), _ = found.step_ranges("turned-0-mrad")
     assert 1e-3 <= accurate == pytest.approx(1.2e-3, rel=0.03)  # the error is dt s⁻¹
 
 

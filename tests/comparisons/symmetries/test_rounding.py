@@ -33,6 +33,24 @@ def test_rounding_in_sub_steps_explains_a_difference_far_away(drift, status):
     assert found["1 km away"].status in ("kept", "nearly kept")
 
 
+@pytest.mark.parametrize(("planted", "status"), [(0, "kept"), (9, "rounding"), (11, "lost")])
+def test_rounding_far_away_explains_no_difference_of_rotation_in_flight(planted, status):
+    """In single precision, an error of 1 % in a velocity or in a spin beyond 5 m; no rounding of a position changes a spin."""
+
+    class Far(made.Exact):
+        precision = np.float32
+
+        def prepare(self, scene, dt):
+            is_far = np.linalg.norm(scene.start.position) > 5.0
+            error = np.ones(13)
+            error[planted] += 1e-2 * is_far * (planted > 0)
+            return made.ExactSimulation(scene, dt, lambda state, time: state * error if time > 0.5 else state)
+
+    body = {"shape": "box", "half_extents": [0.1, 0.1, 0.1], "mass": 1.0}
+    scene = load({"duration": 2.0, "body": body, "start": {"velocity": [0.1, 0.07, -0.3], "angular_velocity": [1.0, 2.0, 3.0]}})
+    assert statuses(Far(), scene, dt=1e-3)["10 m away"].status == status
+
+
 @pytest.mark.parametrize("precision_of_it", [np.float64, np.float32])
 def test_engine_that_does_not_repeat_its_motion_says_nothing_of_symmetries(precision_of_it):
     """State that it keeps would be attributed to rounding, of which the effect is measured with the same engine."""

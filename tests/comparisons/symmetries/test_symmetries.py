@@ -161,6 +161,17 @@ def test_unit_in_the_depth_of_a_contact_is_found_also_if_the_body_starts_in_cont
     assert [one.status for one in found] == ["lost", "lost", "kept", "kept"]
 
 
+def test_fault_that_is_tied_to_the_vertical_is_found_in_flight():
+    """A spin that loses its vertical component: every scene that is turned about the vertical loses as much."""
+
+    def slowed(state, time):
+        return state * np.where(np.arange(13) == 11, 1.0 - 1e-3 * time, 1.0)
+
+    found = lost(made.engine_with("slowed", slowed), "fall-spin")
+    assert "tilted by 1 rad" in found
+    assert not {"turned by 90°", "turned by 1 rad", "mirrored", "other body axes", AGAIN} & found
+
+
 def test_threshold_of_mass_is_found():
     class Heavy(made.Exact):
         name = "heavy"

@@ -299,18 +299,24 @@ def _arguments(*scenes: Scene, engine: str | Sequence[str] | None = None, dt: fl
 
 
 def _several(value: Any) -> Any:
-    return [value] if isinstance(value, str | float | int) else value
+    """The engines or time steps that were asked for, as a list; None if they are those of the session."""
+    asked = [value] if isinstance(value, str | float | int) else None if value is None else list(value)
+    if asked == []:
+        pytest.fail("got an empty list of engines or time steps; give one, or leave it out for those of the session", pytrace=False)
+    return asked
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Call a marked test once for each scene and engine."""
     if "dropspin_result" not in metafunc.fixturenames:
-        if any(mark.name == NAME and mark.args for mark in metafunc.definition.own_markers):
-            pytest.fail(f"{metafunc.function.__name__} is marked with scenes, but does not take dropspin_result", pytrace=False)
+        if any(mark.name == NAME and (mark.args or mark.kwargs) for mark in metafunc.definition.own_markers):
+            pytest.fail(f"{metafunc.function.__name__} is marked with dropspin, but does not take dropspin_result", pytrace=False)
         return
     ids, cases = [], []
     for mark in metafunc.definition.iter_markers(NAME):
         scenes, engine, dt = _arguments(*mark.args, **mark.kwargs)
+        if not scenes and mark.kwargs:
+            pytest.fail(f"{metafunc.function.__name__} is marked with an engine or a time step, but without scenes", pytrace=False)
         for scene, name in product(scenes, _several(engine) or metafunc.config.stash[RUNS].engines or [None]):
             ids.append("-".join(filter(None, [_title(scene), name])))
             cases.append((scene, _several(name), _several(dt)))

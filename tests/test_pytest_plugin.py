@@ -280,6 +280,23 @@ def test_own_adapter_that_cannot_be_imported_fails_wherever_it_is_named(reposito
     done.stdout.fnmatch_lines(["E * spin-principal, absent:Engine: missing: *no_such_engine, which is not installed."])
 
 
+@pytest.mark.parametrize(
+    ("arguments", "fixture", "message"),
+    [
+        ('"spin-principal", engine=[]', "dropspin_result", "got an empty list of engines or time steps; give one, or leave it out *"),
+        ('"spin-principal", dt=[]', "dropspin_result", "got an empty list of engines or time steps; give one, or leave it out *"),
+        ('engine="engines:Mine"', "dropspin_result", "test_marked is marked with an engine or a time step, but without scenes"),
+        ('engine="engines:Mine"', "tmp_path", "test_marked is marked with dropspin, but does not take dropspin_result"),
+    ],
+)
+def test_marker_that_asks_for_nothing_is_refused(repository, arguments, fixture, message):
+    """A list that comes out empty would judge other engines than the test's."""
+    repository.makepyfile(test_own=f"import pytest\n\n@pytest.mark.dropspin({arguments})\ndef test_marked({fixture}):\n    pass\n")
+    done = repository.runpytest_inprocess()
+    done.assert_outcomes(errors=1)
+    done.stdout.fnmatch_lines([f"*{message}"])
+
+
 def test_scenes_of_one_name_have_lines_of_their_own(repository):
     """In the summary, which counts equal rows once."""
     repository.makepyfile(
@@ -339,7 +356,7 @@ def test_marker_without_the_fixture_is_an_error(repository):
     )
     idle = repository.runpytest_inprocess("test_idle.py")
     assert idle.ret == pytest.ExitCode.INTERRUPTED
-    idle.stdout.fnmatch_lines(["test_idle is marked with scenes, but does not take dropspin_result"])
+    idle.stdout.fnmatch_lines(["test_idle is marked with dropspin, but does not take dropspin_result"])
 
 
 @pytest.mark.parametrize(

@@ -84,8 +84,8 @@ def accept(
 
     Returns:
         The new baseline, and a table of the differences from the earlier one. The table has a row for each result, with `value` and
-        `before` in `unit`, and the `change`: new, worse, moved, better, lower, same, gone or undefined. Results of other engines or time
-        steps in a scene whose definition has changed are among those that are gone.
+        `before` in `unit`, and the `change`: new, worse, moved, better, lower, same, gone or undefined. In a scene whose definition has
+        changed all results are new, and those are gone that the run does not have, also of other engines or time steps.
 
     Raises:
         DropspinError: The run was made with `quick`, or the reason is empty or has several lines.
@@ -95,7 +95,8 @@ def accept(
     earlier = _with_current_names(earlier, results, set(measured["engine"]))
     covered = asked_for(earlier.results, results)
     measured["known_failure"] = (measured["verdict"] == "failed") & known_failures
-    comparable = covered[~_has_other_scene(covered, earlier, results)]
+    is_replaced = _has_other_scene(covered, earlier, results)
+    comparable, replaced = covered[~is_replaced], covered[is_replaced]
     found = changes(comparable, measured)
     lost = found["change"].isin(LOST) & broke_down(found, results)
     kept = comparable.merge(found.loc[(found["change"] == "same") | lost, KEY], on=KEY)
@@ -120,7 +121,7 @@ def accept(
         {**earlier.motions, acceptance.key: {**earlier.motions.get(acceptance.key, {}), **digests_of(stamp)}},
         table,
     )
-    removed = changes(outside[is_of_another_scene], measured.iloc[:0])
+    removed = changes(pd.concat([outside[is_of_another_scene], replaced[~are_among(replaced, measured, KEY)]]), measured.iloc[:0])
     return accepted, pd.concat([found[~lost], removed], ignore_index=True)
 
 
@@ -179,6 +180,11 @@ def check(results: Results, baseline: Baseline | str | Path | None = None) -> Ch
     table = pd.concat([_with_known_failures(results, found), as_table(rows)], ignore_index=True)
     attributions = Counter((found["engine"][number], cause) for number, cause in causes.items())
     return Checked(replace(results, table=table), found, baseline.results.drop(accepted.index), attributions)
+
+
+def redefined(results: Results, baseline: Baseline) -> list[str]:
+    """The scenes of a run that have accepted results of another definition."""
+    return sorted(set(baseline.results.loc[_has_other_scene(baseline.results, baseline, results), "scene"]))
 
 
 def _has_other_scene(rows: pd.DataFrame, baseline: Baseline, results: Results) -> "pd.Series[bool]":

@@ -31,7 +31,7 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
     from pathlib import Path
 
     from dropspin.comparisons.regressions.baseline import Baseline, load_baseline, write_baseline
-    from dropspin.comparisons.regressions.checking import accept
+    from dropspin.comparisons.regressions.checking import accept, redefined
     from dropspin.comparisons.results.complete_folders import one_at_a_time
     from dropspin.comparisons.results.store import load_results
     from dropspin.reports.document import Document, Sentences
@@ -47,9 +47,10 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
         changes, sentences = [], []
         for run in runs:
             results = load_results(Path(run), arrays=False)
+            other = redefined(results, new)
             new, accepted = accept(results, new, reason.strip(), datetime.date.today(), known_failures=known_failures)
             changes += accepted.to_dict("records")
-            sentences += accepted_sentences(results, accepted, known_failures)
+            sentences += accepted_sentences(results, accepted, known_failures, other)
         if new.results.empty:
             raise DropspinError(
                 f"{', '.join(runs)}: there is nothing to accept, because no engine was measured; {baseline} is not written."

@@ -102,13 +102,15 @@ def _verdict(checked: Checked, failed_rows: pd.DataFrame, verdict: str) -> str:
     return f"{verdict} {hold}.".lstrip() if judged else verdict
 
 
-def accepted_sentences(results: Results, accepted: pd.DataFrame, known_failures: bool) -> list[str]:
-    """Sentences on how many results of a run were accepted, and which cannot be accepted."""
+def accepted_sentences(results: Results, accepted: pd.DataFrame, known_failures: bool, redefined: Sequence[str] = ()) -> list[str]:
+    """Sentences on how many results of a run were accepted, also in scenes with another definition, and which cannot be accepted."""
     changed = accepted["change"].value_counts()
     order = ("new", "worse", "moved", "better", "lower", "gone", "undefined", "same")
     kinds = [f"{changed[kind]:,} {kind}" for kind in order if kind in changed]
     measured = ", ".join(engine for engine in results.engines if (accepted["engine"] == engine).any())
     notes = [f"Accepted for {counted(len(results.scenes), 'scene')} with {measured}: {', '.join(kinds) or 'no results'}."]
+    if redefined:
+        notes.append(f"The definition has changed of {', '.join(redefined)}: the results accepted before are replaced, not compared.")
     notes += not_repeated(results)
     removed = accepted.drop(asked_for(accepted, results).index).query("change in ['gone', 'undefined']")
     if len(removed):

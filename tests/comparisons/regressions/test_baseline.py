@@ -14,7 +14,7 @@ from support.releases import SCENES, TODAY, WITH_FLOOR, Broken, Candidate, Euler
 
 from dropspin.comparisons.regressions.baseline import Baseline, load_baseline, write_baseline
 from dropspin.comparisons.regressions.changes import KEY
-from dropspin.comparisons.regressions.checking import accept, check
+from dropspin.comparisons.regressions.checking import accept, check, redefined
 from dropspin.reports.stories.check import accepted_sentences
 from dropspin.scenarios import DropspinError
 
@@ -112,6 +112,7 @@ def test_results_of_engines_that_broke_down_stay(release, accepted):
 def test_results_of_a_changed_scene_are_replaced_for_every_engine(longer_fall, accepted):
     """The results of other engines in this scene are removed, and this is said."""
     alone = part(longer_fall, engines=["candidate"])
+    assert redefined(alone, accepted) == ["fall-spin"]
     moved, found = accept(alone, accepted, "longer", TODAY)
     of_scene = moved.results[moved.results["scene"] == "fall-spin"]
     assert set(of_scene["engine"]) == {"candidate"}
@@ -120,6 +121,18 @@ def test_results_of_a_changed_scene_are_replaced_for_every_engine(longer_fall, a
     [said] = [sentence for sentence in accepted_sentences(alone, found, known_failures=False) if "removed" in sentence]
     assert said.startswith(f"{len(removed)} accepted results are removed, because the scene has changed and this run does not cover them: ")
     assert "fall-spin with mujoco" in said
+    [other] = [text for text in accepted_sentences(alone, found, False, redefined(alone, accepted)) if "definition" in text]
+    assert other == "The definition has changed of fall-spin: the results accepted before are replaced, not compared."
+    assert redefined(alone, moved) == []
+
+
+def test_result_that_another_definition_does_not_have_is_gone(longer_fall, accepted):
+    """An engine and a metric that were accepted with the earlier one, and that the run covers."""
+    less = replace(longer_fall, table=longer_fall.table[longer_fall.table["metric"] != "energy_drift"])
+    _, found = accept(less, accepted, "longer", TODAY)
+    gone = found[found["change"] == "gone"]
+    assert set(gone["metric"]) == {"energy_drift"}
+    assert set(gone["scene"]) == {"fall-spin"}
 
 
 def test_scenes_of_older_files_are_those_of_every_acceptance(accepted, tmp_path):

@@ -7,7 +7,7 @@ import ctypes
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -58,7 +58,7 @@ def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
     timed = partial(_finite, entry.adapter, scene, dt)
     if scene.floor is None:
         with suppress(Diverged):
-            if scene.damping is not None and timed(FIRST_STEPS).stepping * scene.steps(dt) <= LONGEST_RUN * FIRST_STEPS:
+            if scene.damping is not None and _is_short(timed, scene.steps(dt), LONGEST_RUN):
                 return time_per_step(timings(lambda: timed(scene.steps(dt)), MOST_RUNS, LONG_ENOUGH)) / dt
             return time_per_step(timings_in_flight(timed, FIRST_STEPS, TIMING_REPEATS, LONG_ENOUGH)) / dt
     with suppress(Diverged):
@@ -89,14 +89,19 @@ def costs_per_world(
             batch, alone = timed(1).state, time_steps(entry.adapter, scene, dt, 1).state  # and compile
             if not _are_alike(entry, scene, batch, alone, min(error, ALIKE)):  # as of another method
                 return [math.nan] * len(steps), Breakdown("failed", "the states of a batch are not those of a single simulation")
-            if scene.floor is None and scene.damping is None:
+            if scene.floor is None and not (scene.damping is not None and _is_short(timed, count, LONGEST_BATCH)):
                 with suppress(Diverged):
                     times[-1] = time_per_step(timings_in_flight(timed, FIRST_STEPS_OF_A_BATCH, 1, BATCH_SECONDS))
-            if math.isnan(times[-1]) and timed(FIRST_STEPS).stepping * count <= LONGEST_BATCH * FIRST_STEPS:
+            if math.isnan(times[-1]) and _is_short(timed, count, LONGEST_BATCH):
                 times[-1] = time_per_step([timed(count)])
         except Exception as error:  # whatever an engine raises costs its own batch only
             failure = failure or classify(error)
     return [per_step / (dt * worlds) for (dt, _), per_step in zip(steps, times, strict=True)], failure
+
+
+def _is_short(timed: Callable[[int], TimedSteps], steps: int, longest: float) -> bool:
+    """Whether a run takes at most so long [s], judged by its first steps."""
+    return timed(FIRST_STEPS).stepping * steps <= longest * FIRST_STEPS
 
 
 def _are_alike(entry: EngineEntry, scene: Scenario, batch: Array, alone: Array, share: float) -> bool:

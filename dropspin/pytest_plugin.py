@@ -185,10 +185,8 @@ class Runs:
             pytrace: Whether the failure shows the lines of the calling test.
         """
         __tracebackhide__ = True
-        added = [
-            {"message": _message(row), "fails": self._fails(row), "asked": (result.given, result.engines[row["engine"]])} for row in rows
-        ]
-        judged = [row | more for row, more in zip(rows, added, strict=True)]
+        asked = {label: (result.given, name) for label, name in result.engines.items()}
+        judged = [row | {"message": _message(row), "fails": self._fails(row), "asked": asked[row["engine"]]} for row in rows]
         node.stash.setdefault(JUDGED, []).extend(row for row in judged if row["fails"] or row["verdict"] in STOPPED | {"passed", "known"})
         failing = [row for row in judged if row["fails"]]
         if failing:

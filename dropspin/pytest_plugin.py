@@ -58,6 +58,7 @@ class Result:
         given: The scene's name or path, as given on the command line.
         engines: The names by which engines are run, by the label in the rows.
         dts: The requested time steps [s]; empty for the default ones.
+        definition: A hash of the scene's name or mapping, and of the content of its file.
     """
 
     scene: str
@@ -66,6 +67,7 @@ class Result:
     given: str = field(repr=False)
     engines: Mapping[str, str] = field(repr=False)
     dts: tuple[float, ...] = field(repr=False)
+    definition: str = field(default="", repr=False)
 
     def value(self, metric: str, dt: float | None = None, engine: str | None = None) -> float:
         """The measured value of a metric, in the metric's unit; NaN if it is undefined.
@@ -139,8 +141,9 @@ class Runs:
         options = _options(engines, dts, self.baseline)
         file = None if isinstance(scene, Mapping) else self.root / scene
         content = hashlib.sha256(file.read_bytes()).hexdigest() if file and file.is_file() else ""  # a test may write a file again
-        asked = [scene if isinstance(scene, Mapping) else os.fspath(scene), options, content]
-        name = f"{_title(scene)}-{hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]}"
+        given = scene if isinstance(scene, Mapping) else os.fspath(scene)
+        definition, asked = (_hash(of) for of in ([given, content], [given, options, content]))
+        name = f"{_title(scene)}-{asked[:8]}"
         if name in self._results:
             return self._results[name]
         folder, kept = self.folder / name, self.folder / f"{name}.json"
@@ -159,7 +162,7 @@ class Runs:
         if not stored["rows"]:
             pytest.fail(stored["error"], pytrace=False)
         names = json.loads((folder / "run.json").read_text(encoding="utf-8"))["provenance"]["names"]
-        self._results[name] = Result(stored["rows"][0]["scene"], stored["rows"], folder, target, names, tuple(dts))
+        self._results[name] = Result(stored["rows"][0]["scene"], stored["rows"], folder, target, names, tuple(dts), definition)
         return self._results[name]
 
     def dropspin(self, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -185,7 +188,7 @@ class Runs:
             pytrace: Whether the failure shows the lines of the calling test.
         """
         __tracebackhide__ = True
-        asked = {label: (result.given, name) for label, name in result.engines.items()}
+        asked = {label: (result.definition, name) for label, name in result.engines.items()}
         judged = [row | {"message": _message(row), "fails": self._fails(row), "asked": asked[row["engine"]]} for row in rows]
         node.stash.setdefault(JUDGED, []).extend(row for row in judged if row["fails"] or row["verdict"] in STOPPED | {"passed", "known"})
         failing = [row for row in judged if row["fails"]]
@@ -226,6 +229,10 @@ def _options(engines: Iterable[str], dts: Iterable[float], baseline: str | None)
     """Options of `dropspin run`."""
     named = [word for engine in engines for word in ("-e", engine)] + [word for dt in dts for word in ("--dt", repr(float(dt)))]
     return named + ([] if baseline is None else ["--baseline", baseline])
+
+
+def _hash(asked: Any) -> str:
+    return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
 
 
 def _title(scene: Scene) -> str:
@@ -313,11 +320,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     ids, cases = [], []
     for mark in metafunc.definition.iter_markers(NAME):
         scenes, engine, dt = _arguments(*mark.args, **mark.kwargs)
+        dts = _several(dt)
         if not scenes and mark.kwargs:
             pytest.fail(f"{metafunc.function.__name__} is marked with an engine or a time step, but without scenes", pytrace=False)
         for scene, name in product(scenes, _several(engine) or metafunc.config.stash[RUNS].engines or [None]):
             ids.append("-".join(filter(None, [_title(scene), name])))
-            cases.append((scene, _several(name), _several(dt)))
+            cases.append((scene, _several(name), dts))
     if cases:
         metafunc.parametrize("dropspin_result", cases, ids=ids, indirect=True)
 

@@ -33,7 +33,10 @@ DEEPER = 1e-3  # of the body's size; smaller distances are ignored
 NEVER_RESTS = 1.5  # times the speed that gravity adds in a step, which a resting body may have between two solutions
 SAME_SPEED = 4.5  # eps; speeds closer than this are equal to the last digit, also if they are norms
 HELD = 3  # rows in which a clamped speed is equal to the last digit
-SUDDEN = 1e-6  # relative; the least change of a speed from row to row just before a clamp; one that settles changes less
+SUDDEN, SUDDEN_OF_SAME = 1e-6, 1e4
+"""The least change of a speed from row to row just before a clamp, relative to it, and to the difference of speeds that are equal to the
+last digit: one that settles changes less.
+"""
 SAME_STARTS = 1e-9  # relative; or twice as many eps: speeds from two initial states that are equal
 
 
@@ -245,12 +248,13 @@ def held_speeds(motion: Trajectory, eps: float) -> dict[str, HeldSpeed]:
 
 def _is_held(sizes: Array, largest: float, eps: float) -> bool:
     """Whether a component or norm that varied, or was larger initially, stays at its largest value for some rows."""
-    held = np.abs(sizes - largest) <= SAME_SPEED * eps * largest
-    if sizes[0] > largest * (1.0 + SUDDEN) and held[1]:
+    same = SAME_SPEED * eps
+    held, sudden = np.abs(sizes - largest) <= same * largest, max(SUDDEN, SUDDEN_OF_SAME * same)
+    if sizes[0] > largest * (1.0 + sudden) and held[1]:
         return True
     in_a_row = np.logical_and.reduce([held[shift : len(held) - HELD + 1 + shift] for shift in range(HELD)])
     first = int(np.argmax(in_a_row))
-    return bool(in_a_row.any()) and first > 1 and abs(sizes[first - 1] - sizes[first - 2]) > SUDDEN * largest
+    return bool(in_a_row.any()) and first > 1 and abs(sizes[first - 1] - sizes[first - 2]) > sudden * largest
 
 
 def clamped(motion: Trajectory, other: Trajectory, eps: float) -> list[Diagnosis]:

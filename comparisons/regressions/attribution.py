@@ -90,7 +90,7 @@ def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Origin, str]:
     asked_for = [engine_name(stamp.get("names", {}).get(engine, "")) for stamp in (old, new)]
     classes = [given.rpartition(":")[2] for given in asked_for if ":" in given]
     if len({*classes}) == 2:  # two classes of one file may have the same name as engines
-        found["adapter"] = " → ".join(map(printable, asked_for))
+        found["adapter"] = ", ".join([" → ".join(map(printable, asked_for)), *filter(None, [found.get("adapter")])])
     if changed := changed_settings(old, new, engine):
         found["settings"] = f"its settings ({', '.join(map(printable, changed))})"
     return found

@@ -57,7 +57,10 @@ HEADER = (
 
 
 class Acceptance(Table):
-    """The date, reason, versions and processor of an acceptance, hashes of the code of dropspin and adapters, settings of each engine."""
+    """The date, reason, versions and processor of an acceptance, hashes of the code of dropspin and adapters, settings of each engine.
+
+    And the names by which adapters of the user were asked for.
+    """
 
     date: datetime.date
     reason: Annotated[Text, Field(min_length=1)]
@@ -65,6 +68,7 @@ class Acceptance(Table):
     cpu: Text | None = None
     code: Text | None = None
     adapters: dict[Text, Text] = Field(default_factory=dict)
+    names: dict[Text, Text] = Field(default_factory=dict)
     settings: dict[Text, dict[Text, Text]] = Field(default_factory=dict)
 
     @property
@@ -79,6 +83,7 @@ class Acceptance(Table):
             update={
                 "versions": {names.get(name, name): version for name, version in self.versions.items()},
                 "adapters": {labels.get(label, label): code for label, code in self.adapters.items()},
+                "names": {labels.get(label, label): name for label, name in self.names.items()},
                 "settings": {labels.get(label, label): settings for label, settings in self.settings.items()},
             }
         )

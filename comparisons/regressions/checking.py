@@ -106,8 +106,9 @@ def accept(
     stamp = results.provenance
     adapters = {engine: code for engine, code in stamp["adapters"].items() if code is not None and (measured["engine"] == engine).any()}
     settings = {engine: common_settings(stamp, engine) for engine in adapters}
+    names = {engine: name for engine in adapters if ":" in (name := stamp["names"].get(engine, ""))}
     content = {"date": date, "reason": reason, "versions": versions_behind(stamp), "cpu": stamp["cpu"], "code": stamp["code"]}
-    acceptance = validated(Acceptance, "accept", content | {"adapters": adapters, "settings": settings})
+    acceptance = validated(Acceptance, "accept", content | {"adapters": adapters, "names": names, "settings": settings})
     moved = measured[~are_among(measured, kept, KEY)].assign(by=acceptance.key)
     outside = earlier.results.drop(covered.index)
     is_of_another_scene = _has_other_scene(outside, earlier, results)
@@ -207,7 +208,7 @@ def _causes(found: pd.DataFrame, baseline: Baseline, results: Results) -> dict[i
     def attributed(engine: str, by: str, motions: Motion) -> Attribution:
         # Libraries that have not changed since the results of another engine were accepted are not excluded by these.
         unmoved = [other for other, accepted in same.items() if all(around(by).items() <= around(one).items() for one in accepted)]
-        return attribute(baseline.acceptances[by].stamp_of(engine) | {"names": baseline.engines}, stamp, engine, unmoved, motions)
+        return attribute(baseline.acceptances[by].stamp_of(engine), stamp, engine, unmoved, motions)
 
     failing = regressed(found)
     return {

@@ -27,8 +27,8 @@ ENOUGH = 3
 class Answer:
     """What a run says about one engine and one metric.
 
-    Its scenes are those in which any engine has an error in this metric, or has none because it fails or another one broke down, and those
-    in which the metric applies and every engine broke down.
+    Its scenes are those in which any engine has an error in this metric, or has none because it fails or broke down at each time step, and
+    those in which the metric applies and every engine broke down.
 
     Attributes:
         metric: The metric.
@@ -110,13 +110,14 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     keys = ["engine", "scene", "dt"]
     steps = tried[keys].assign(default=np.where(is_broken[tried.index], "beyond", "undecided")).drop_duplicates(keys)
     declined = table[table["verdict"] == "declined"].drop_duplicates(["engine", "scene"])
-    broken = set(table.loc[is_broken, "scene"])
-    lost_scenes = broken - set(table.loc[is_exact, "scene"]) - set(results.recorded)
+    broken = set(zip(table.loc[is_broken, "scene"], table.loc[is_broken, "engine"], strict=True))
+    lost_scenes = set(table.loc[is_broken, "scene"]) - set(table.loc[is_exact, "scene"]) - set(results.recorded)
     truths = {name: (results.scenes[name], exact_solution(results.scenes[name])) for name in sorted(lost_scenes)}
     answers = []
     for metric in QUESTIONS:
         of_metric = found[found["metric"] == metric]
-        tests = of_metric["value"].notna() | of_metric["verdict"].isin(FAILURES) | of_metric["scene"].isin(broken)
+        unknown = {scene for scene, _ in broken - set(zip(of_metric["scene"], of_metric["engine"], strict=True))}
+        tests = of_metric["value"].notna() | of_metric["verdict"].isin(FAILURES) | of_metric["scene"].isin(unknown)
         rows = of_metric[[*keys, "state", "size", "cost"]]
         scenes = {*rows.loc[tests, "scene"], *(name for name, known in truths.items() if METRICS[metric].applies(*known))}
         tested = steps[steps["scene"].isin(scenes)].merge(rows, how="left", on=keys)

@@ -144,7 +144,7 @@ def errors_over_steps(
     steps = tuple((dt, errors[0]) for dt, errors in tried)
     if verdict is not None and not np.isfinite([error for _, error in steps]).any():
         return Ladder(entry.label, (), "not_run", undefined or reason, undefined or reason, verdict)
-    is_within = metrics[0] == metrics[1] and all(error <= within for _, error in steps[-LAST:])
+    is_within = metrics[0] == metrics[1] and all(error <= within for _, error in steps[: len(steps) - (ended == "failed")][-LAST:])
     left_out = "" if is_within else _left_out(scene, tried, metrics[1], undefined or reason)
     return Ladder(entry.label, steps, ended, reason, left_out, verdict, undefined)
 

@@ -246,6 +246,9 @@ def test_sudden_constant_speed_is_a_clamp_and_a_terminal_speed_is_not():
     steps = np.arange(3000)
     cut = [falling(np.maximum(start - 0.049 * steps, -100.0)) for start in (-60.0, -70.0)]
     assert [one.size for one in clamped(*cut, EPS)] == [100.0]
+    for rate in (0.2, 0.9, 2.0):  # in single precision, also if it settles within a few steps
+        quick = [falling((-15.0 + (15.0 + start) * np.exp(-rate * steps)).astype(np.float32)) for start in (0.0, -5.0)]
+        assert clamped(*quick, float(np.finfo(np.float32).eps)) == []
     settling = falling(-15.0 * (1.0 - np.exp(-0.05 * steps)))
     assert settling.velocity[-1, 1] == settling.velocity[-2, 1]
     assert held_speeds(settling, EPS) == {}

@@ -59,6 +59,10 @@ UNIFORM = 1.0 / math.sqrt(12.0)
 """Standard deviation of a number that is uniform between 0 and 1."""
 DISCREPANCIES = {0.001: 0.7, 0.2: 0.3}
 """ρ and its probability: a smooth series, or one in which chance, a kink or a change of regime changes each error by a fifth."""
+WIDE, WIDE_DISCREPANCY = 100.0, 1e-6
+"""A ratio of the coarsest to the finest step above which each error also has such a share of the largest that its form allows there: else
+of the covariances of a competing order, which differ by more than the digits of a double, only rounding is left.
+"""
 NO_ASYMPTOTIC_ERROR = 0.5
 """Probability that m is 0 before the errors are seen."""
 SMALLEST_SCALE, LARGEST_SCALE, SCALES_PER_DECADE = 1e-3, 10.0, 2
@@ -73,9 +77,9 @@ describes.
 
 class _Forms(NamedTuple):
     covariances: Array
-    """Covariances of the series divided by Hᵖ, shape (forms, n, n)."""
+    """Covariances of the series divided by `leading`, shape (forms, n, n)."""
     leading: Array
-    """Hᵖ, shape (forms, n)."""
+    """Hᵖ, for steps of a wide range times the standard deviations of the series divided by it, shape (forms, n)."""
     orders: Array
     """The order that dominates at the finest step."""
     log_weights: Array
@@ -188,8 +192,12 @@ def _forms(h: tuple[float, ...], claimed: float | None, one_start: bool) -> _For
         for terms, observed, chance in _series(steps, float(order), one_start):
             for discrepancy, share in DISCREPANCIES.items():
                 covariance = terms.T @ terms + discrepancy**2 * np.eye(len(steps))
+                leading = steps**order
+                if WIDE * min(h) < max(h):
+                    sizes = np.sqrt(np.diag(covariance))
+                    covariance, leading = covariance / np.outer(sizes, sizes) + WIDE_DISCREPANCY**2 * np.eye(len(steps)), leading * sizes
                 logs = math.log(weight * share * chance), math.log(ratio_of_weights)
-                forms.append((covariance, steps**order, observed, *logs))
+                forms.append((covariance, leading, observed, *logs))
     return _Forms(*map(np.array, zip(*forms, strict=True)))
 
 

@@ -291,3 +291,23 @@ def test_model_error_has_an_interval_that_excludes_zero(h, errors, signed):
     """Where 0 is less probable than 3 %, but within the interval, the cause is not decided."""
     found = error_budget(h, errors, signed=signed)
     assert (found.cause, found.lower <= 0.0 <= found.upper) == ("unresolved", True)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("ratio", "count"), [(5.0, 5), (7.0, 5), (10.0, 5), (20.0, 4), (100.0, 3)])
+@pytest.mark.parametrize("limit", [0.0, 0.05])
+def test_steps_of_a_wide_range_decide(ratio, count, limit):
+    """Up to a factor of 10,000, where covariances of competing orders differ by more than the digits of a double."""
+    h = 0.1 * ratio ** -np.arange(float(count))
+    found = error_budget(h, limit + h * (1.0 - 3.0 * h))
+    assert found.cause == ("model" if limit else "discretisation")
+    assert found.lower <= limit <= found.upper
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1e-4])
+@pytest.mark.parametrize("kept", [0.9, 0.7])
+def test_error_that_only_begins_to_leave_its_largest_value_is_no_model_error(kept, jitter):
+    """All restitution lost at all time steps but the finest: equal to the last digit, or nearly."""
+    errors = np.array([1.0, 1.0 - jitter, 1.0, 1.0 - 0.5 * jitter, kept])
+    assert error_budget(16e-3 * 0.5 ** np.arange(5.0), errors, resolution=0.0).cause == "unresolved"
+    assert error_budget(16e-3 * 0.5 ** np.arange(5.0), -errors, resolution=0.0).cause == "unresolved"

@@ -37,7 +37,7 @@ SUDDEN, SUDDEN_OF_SAME = 1e-6, 1e4
 """The least change of a speed from row to row just before a clamp, relative to it, and to the difference of speeds that are equal to the
 last digit: one that settles changes less.
 """
-SAME_STARTS = 1e-9  # relative; or twice as many eps: speeds from two initial states that are equal
+SAME_STARTS = 1e-9  # relative; speeds from two initial states that are equal, or in single precision those within twice `SAME_SPEED`
 
 
 class Diagnosis(NamedTuple):

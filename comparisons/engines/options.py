@@ -164,9 +164,9 @@ class Configured:
         return self.without(["profile", *self.settings])
 
     @property
-    def untuned(self) -> Self:
-        """The calibrated engine with the defaults of its numeric options, but for those that set the accuracy."""
-        return self.calibrated.without(set(self.numbers).difference(self.accuracy))
+    def given_numbers(self) -> set[str]:
+        """The numeric options that were given, but for those that set the accuracy."""
+        return set(self.options).intersection(self.numbers).difference(self.accuracy)
 
     def without(self, names: Collection[str]) -> Self:
         """The same engine without some of its options, and without settings that then have no effect."""

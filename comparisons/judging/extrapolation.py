@@ -60,7 +60,7 @@ UNIFORM = 1.0 / math.sqrt(12.0)
 DISCREPANCIES = {0.001: 0.7, 0.2: 0.3}
 """ρ and its probability: a smooth series, or one in which chance, a kink or a change of regime changes each error by a fifth."""
 WIDE, WIDE_DISCREPANCY = 100.0, 1e-6
-"""Above such a ratio of the steps each error has this part of its size for itself: covariances differ by more than the digits of a double."""
+"""Above such a ratio of the steps each error has this part of its size alone: covariances differ by more than the digits of a double."""
 NO_ASYMPTOTIC_ERROR = 0.5
 """Probability that m is 0 before the errors are seen."""
 SMALLEST_SCALE, LARGEST_SCALE, SCALES_PER_DECADE = 1e-3, 10.0, 2

@@ -128,7 +128,7 @@ def explaining_failure(engine: Engine, options: Mapping[str, str], error_of: Cal
         The shares; before them, by `ALL_SETTINGS`, the share of the error that calibrated settings take away, unless it is about all and
         there are shares.
     """
-    calibrated = engine.untuned
+    calibrated = engine.calibrated.without(engine.given_numbers)
     if options.keys() <= calibrated.options.keys():
         return {}
     error, remaining = error_of(engine), error_of(calibrated)

@@ -119,7 +119,7 @@ def _explaining_settings(study: EngineStudy, rows: Sequence[Measurement]) -> Ite
     measured = [row for row in rows if row.kind in ("truth", "invariant") and row.metric not in ARTEFACTS]
     as_dt_falls = {row.metric for row in rows if row.kind == "asymptotic_error" and row.verdict in FAILURES}
     failing = [row for row in measured if row.verdict in FAILURES] or [row for row in measured if row.metric in as_dt_falls]
-    if engine is None or engine.untuned.options == engine.options or not failing or study.own.truth is None:
+    if engine is None or (engine.is_calibrated and not engine.given_numbers) or not failing or study.own.truth is None:
         return
     dt = min(row.dt for row in failing)
     sizes = {row.metric: abs(row.value) / scale(scene, row.unit) for row in failing if row.dt == dt}

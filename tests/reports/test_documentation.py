@@ -225,7 +225,7 @@ def test_page_on_adapters_documents_every_member_of_the_protocol():
     abstract = {f"{kind.__name__}.{name}" for kind in kinds for name in kind.__abstractmethods__}
     defined_by_dropspin = {"options", "option", "label", "is_default", "accuracy_levels", "refined", "represented_otherwise"}
     defined_by_dropspin |= {"steps_batches", "refusal", "given", "given_of", "options_in_force", "unmet_need", "calibrated"}
-    defined_by_dropspin |= {"is_calibrated", "untuned", "without", "acting", "allows"}
+    defined_by_dropspin |= {"is_calibrated", "given_numbers", "without", "acting", "allows"}
     members = {f"{kind.__name__}.{name}" for kind in kinds for name in public_members(kind) - defined_by_dropspin}
     found = rows_of("The protocol")
     assert sorted(found["required"]) == sorted(abstract | {"Engine.name"})

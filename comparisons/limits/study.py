@@ -88,9 +88,8 @@ class AxisScan:
     @property
     def sound_range(self) -> tuple[int, int] | None:
         """The indices of the first and the last value of the sound range around the nominal value; None if that value is not sound."""
-        by_mode = groupby(range(len(self.points)), lambda number: self.points[number].mode == "sound")
-        ranges = [list(numbers) for is_sound, numbers in by_mode if is_sound]
-        return next(((numbers[0], numbers[-1]) for numbers in ranges if self.points.index(self.nominal) in numbers), None)
+        nominal = self.points.index(self.nominal)
+        return next(((row[0], row[-1]) for row in _rows(self.points, ACCURATE) if nominal in row), None)
 
 
 @dataclass(frozen=True)
@@ -130,9 +129,15 @@ class LimitsStudy:
         return next(scanned, tuple(reversed(self.refinements.get(engine, ()))))
 
 
+def _rows(points: Sequence[ScanPoint], allowed: Sequence[str]) -> list[list[int]]:
+    """The indices of the points in each row of neighbours whose modes are allowed."""
+    by_mode = groupby(range(len(points)), lambda number: points[number].mode in allowed)
+    return [list(numbers) for is_allowed, numbers in by_mode if is_allowed]
+
+
 def _range(points: Sequence[ScanPoint], allowed: Sequence[str], nominal: float) -> tuple[float, float] | None:
     """The first and the last value of the points in a row whose modes are allowed, around the nominal one or else from the first on."""
-    rows = [[point.value for point in row] for is_allowed, row in groupby(points, lambda point: point.mode in allowed) if is_allowed]
+    rows = [[points[number].value for number in row] for row in _rows(points, allowed)]
     found = next((row for row in rows if nominal in row), rows[0] if rows and rows[0][0] == points[0].value else None)
     return None if found is None else (found[0], found[-1])
 

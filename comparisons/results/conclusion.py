@@ -111,7 +111,7 @@ def conclude(results: Results, within: float = WITHIN) -> list[Answer]:
     steps = tried[keys].assign(default=np.where(is_broken[tried.index], "beyond", "undecided")).drop_duplicates(keys)
     declined = table[table["verdict"] == "declined"].drop_duplicates(["engine", "scene"])
     broken = set(zip(table.loc[is_broken, "scene"], table.loc[is_broken, "engine"], strict=True))
-    lost_scenes = set(table.loc[is_broken, "scene"]) - set(table.loc[is_exact, "scene"]) - set(results.recorded)
+    lost_scenes = {scene for scene, _ in broken} - set(table.loc[is_exact, "scene"]) - set(results.recorded)
     truths = {name: (results.scenes[name], exact_solution(results.scenes[name])) for name in sorted(lost_scenes)}
     answers = []
     for metric in QUESTIONS:

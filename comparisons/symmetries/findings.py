@@ -122,10 +122,12 @@ def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Eff
 
 def _turn_alike(scene: Scenario, pairs: Pairs, allowed: Array) -> bool:
     """Whether orientations and spins differ by no more than is allowed: without a floor, no rounding of a position changes them."""
-    moved = [second.copy() for _, second in pairs]
-    for (first, _), states in zip(pairs, moved, strict=True):
-        states[:, POSITION], states[:, VELOCITY] = first[:, POSITION], first[:, VELOCITY]
-    return all((differences(scene, first, states) <= allowed).all() for (first, _), states in zip(pairs, moved, strict=True))
+    for first, second in pairs:
+        turned = second.copy()
+        turned[:, POSITION], turned[:, VELOCITY] = first[:, POSITION], first[:, VELOCITY]
+        if not (differences(scene, first, turned) <= allowed).all():
+            return False
+    return True
 
 
 def rounding(steps: Array, precision: type) -> Array:

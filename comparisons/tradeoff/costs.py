@@ -54,10 +54,8 @@ def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
     only the first steps.
     """
     timed = partial(_finite, entry.adapter, scene, dt)
-    if scene.floor is None:
-        with suppress(Diverged):
-            if scene.damping is not None and _is_short(timed, scene.steps(dt), LONGEST_RUN):
-                return time_per_step(timings(lambda: timed(scene.steps(dt)), MOST_RUNS, LONG_ENOUGH)) / dt
+    with suppress(Diverged):
+        if _is_timed_in_flight(scene, timed, scene.steps(dt), LONGEST_RUN):
             return time_per_step(timings_in_flight(timed, FIRST_STEPS, TIMING_REPEATS, LONG_ENOUGH)) / dt
     with suppress(Diverged):
         return time_per_step(timings(lambda: timed(scene.steps(dt)), MOST_RUNS, LONG_ENOUGH)) / dt
@@ -91,14 +89,19 @@ def costs_per_world(
                 return [math.nan] * len(steps), Breakdown("failed", "the states of a batch are not those of a single simulation")
             if apart > error:  # as of an iterative solver that ends elsewhere, which is less accurate than the single simulation
                 continue
-            if scene.floor is None and not (scene.damping is not None and _is_short(timed, count, LONGEST_BATCH)):
+            if _is_timed_in_flight(scene, timed, count, LONGEST_BATCH):
                 with suppress(Diverged):
                     times[-1] = time_per_step(timings_in_flight(timed, FIRST_STEPS_OF_A_BATCH, 1, BATCH_SECONDS))
             if math.isnan(times[-1]) and _is_short(timed, count, LONGEST_BATCH):
                 times[-1] = time_per_step([timed(count)])
-        except Exception as error:  # whatever an engine raises costs its own batch only
-            failure = failure or classify(error)
+        except Exception as raised:  # whatever an engine raises costs its own batch only
+            failure = failure or classify(raised)
     return [per_step / (dt * worlds) for (dt, _), per_step in zip(steps, times, strict=True)], failure
+
+
+def _is_timed_in_flight(scene: Scenario, timed: Callable[[int], TimedSteps], steps: int, longest: float) -> bool:
+    """Whether as many steps are timed as it takes, in place of a whole run."""
+    return scene.floor is None and (scene.damping is None or not _is_short(timed, steps, longest))
 
 
 def _is_short(timed: Callable[[int], TimedSteps], steps: int, longest: float) -> bool:

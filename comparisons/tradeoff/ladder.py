@@ -7,7 +7,7 @@ import math
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
 from typing import Literal
 
@@ -131,9 +131,6 @@ def errors_over_steps(
         tried.append((interval / division, errors))
         spent += seconds
         undefined, verdict = why or undefined, broken or verdict
-        if verdict == "timed_out":  # which would cost as much time again
-            ended, reason = "failed", undefined
-            break
         stalled = _stalled([errors[0] for _, errors in tried if np.isfinite(errors[0])])
         if stalled and not _has_large_angle(metrics, errors):
             ended, reason = "error_stopped_falling", f"at the last {stalled} time steps the error fell by less than a fifth each"
@@ -141,12 +138,12 @@ def errors_over_steps(
         if spent >= budget:
             ended, reason = "budget", f"the budget of {budget:g} s of processor time was spent"
             break
-    steps = tuple((dt, errors[0]) for dt, errors in tried)
-    if verdict is not None and not np.isfinite([error for _, error in steps]).any():
+    ladder = Ladder(entry.label, tuple((dt, errors[0]) for dt, errors in tried), ended, reason, "", verdict, undefined)
+    if verdict is not None and not np.isfinite([error for _, error in ladder.steps]).any():
         return Ladder(entry.label, (), "not_run", undefined or reason, undefined or reason, verdict)
-    is_within = metrics[0] == metrics[1] and all(error <= within for _, error in steps[: len(steps) - (ended == "failed")][-LAST:])
-    left_out = "" if is_within else _left_out(scene, tried, metrics[1], undefined or reason)
-    return Ladder(entry.label, steps, ended, reason, left_out, verdict, undefined)
+    if metrics[0] == metrics[1] and all(error <= within for _, error in ladder.completed[-LAST:]):
+        return ladder
+    return replace(ladder, left_out=_left_out(scene, tried, metrics[1], undefined or reason))
 
 
 def _has_large_angle(metrics: Sequence[str], errors: Sequence[float]) -> bool:
@@ -196,6 +193,8 @@ def _errors(
         errors, [why, *_] = map(list, zip(*(_error(metric, cases) for metric in metrics), strict=True))
     except Exception as error:  # the engine may fail at coarse time steps alone
         failure = classify(error)
+        if failure.verdict == "timed_out":  # which would cost as much time at the next time step
+            raise failure from None
         return errors, processor_time() - start, failure.reason, None if failure.verdict == "diverged" else failure.verdict
     if np.isfinite(errors[0]):
         return errors, processor_time() - start, "", None

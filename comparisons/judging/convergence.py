@@ -13,7 +13,7 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.judging.error_budget import ErrorBudget, error_budget, growing, is_sufficient, vector_budget, widened
-from dropspin.comparisons.judging.series import grows_without_limit
+from dropspin.comparisons.judging.series import grows_without_limit, noise_of_missed
 from dropspin.comparisons.judging.verdicts import COMBINED, WITHIN_UNCERTAINTY, Cause
 from dropspin.comparisons.measuring.comparison import Unresolved
 from dropspin.comparisons.measuring.contact_runs import Mask
@@ -34,7 +34,7 @@ STANDARD_DEVIATIONS = 0.5
 """Factor on a resolution: half of the range of four means over quarters of the phases is twice the standard deviation of their mean."""
 SATURATION = 0.9 * math.pi
 """An angle this near to π saturates, so that it does not measure the error of the orientation."""
-WORSE = {"unresolved": 1, "model": 2}
+WORSE = {"discretisation": 1, "unresolved": 2, "model": 3}
 """Causes that are worse than those of an error that vanishes."""
 LARGE_SHARE = 0.5
 """Share of the largest error of all flights above which that of the flights that enough time steps resolve stands for all."""
@@ -272,10 +272,11 @@ def _with_other_sign(part: Part, parts: Array) -> list[Part]:
 
 def _errors_of(scene: Scenario, metric: Metric, series: Sequence[SeriesPoint], part: Part) -> tuple[Array, Array]:
     """Errors and their resolution in one flight, with one sign; NaN where a time step does not resolve it, or the error saturates."""
-    errors, resolutions = (
-        np.array([values[part] if values.ndim == len(part) and len(values) > part[0] else math.nan for values in both])
-        for both in zip(*(point.average[:2] for point in series), strict=True)
+    errors, resolutions, jumps = (
+        np.array([values[part] if values.ndim == len(part) and len(values) > part[0] else math.nan for values in all_steps])
+        for all_steps in zip(*(point.average for point in series), strict=True)
     )
+    resolutions = np.maximum(resolutions, noise_of_missed(np.array([point.dt for point in series]), jumps))
     if metric.unit == "rad":
         errors[np.abs(errors) > SATURATION] = math.nan
     if metric.name == "position_error" and scene.starts_above_floor and scene.recording is None:

@@ -259,8 +259,8 @@ def _attributed(
     median, lower, upper = posterior.interval(judged_together)
     if not posterior.has_sign:  # one part that is smaller than another does not show
         upper = max(upper, finest)
-    excludes_zero = floor > 0.0 or lower > 0.0 or upper < 0.0  # the interval of a model error begins beyond the floor
-    if excludes_zero and max(above, below) > 1.0 - MODEL_RISK / judged_together:
+    if (lower > 0.0 or upper < 0.0) and max(above, below) > 1.0 - MODEL_RISK / judged_together:
+        # The interval of a model error begins beyond the floor.
         lower, upper = (lower, min(upper, -floor)) if posterior.has_sign and below > above else (max(lower, floor), upper)
         return "model", (median, lower, upper)
     lower, upper = min(lower, 0.0), max(upper, 0.0)

@@ -61,6 +61,8 @@ DISCREPANCIES = {0.001: 0.7, 0.2: 0.3}
 """ρ and its probability: a smooth series, or one in which chance, a kink or a change of regime changes each error by a fifth."""
 WIDE, WIDE_DISCREPANCY = 100.0, 1e-6
 """Above such a ratio of the steps each error has this part of its size alone: covariances differ by more than the digits of a double."""
+RELATIVE_ROUNDING = 8.0 * np.finfo(float).eps
+"""Rounding of each error, relative to the largest."""
 NO_ASYMPTOTIC_ERROR = 0.5
 """Probability that m is 0 before the errors are seen."""
 SMALLEST_SCALE, LARGEST_SCALE, SCALES_PER_DECADE = 1e-3, 10.0, 2
@@ -169,7 +171,8 @@ def extrapolate(
     parts = [_fit(forms, errors, noise)]
     if not signed:
         squares = _fit(forms, errors**2, 2.0 * np.abs(errors) * noise + noise**2)
-        log_weights = squares.log_weights + np.sum(np.log(2.0 * np.maximum(np.abs(errors), noise)))
+        least = np.maximum(noise, RELATIVE_ROUNDING * np.max(np.abs(errors)))  # an error may be 0
+        log_weights = squares.log_weights + np.sum(np.log(2.0 * np.maximum(np.abs(errors), least)))
         log_weights[forms.orders < 2.0 * ORDERS[0], 0] = -np.inf  # the square of an error that vanishes has twice its order
         parts.append(squares._replace(log_weights=log_weights))
     return _posterior(parts, forms, len(h))
@@ -251,7 +254,7 @@ def _fit(forms: _Forms, e: Array, noise: Array) -> _Fit:
     size = float(np.max(np.abs(e)))
     scale = max(float(np.ptp(e)), 1e-9 * size, float(np.min(noise)))
     leading = forms.leading
-    relative = (np.hypot(noise, 8.0 * np.finfo(float).eps * size) / scale / leading) ** 2
+    relative = (np.hypot(noise, RELATIVE_ROUNDING * size) / scale / leading) ** 2
     covariances = forms.covariances + relative[:, :, None] * np.eye(len(e))
     series, ones = e / scale / leading, 1.0 / leading
     weighted = np.linalg.solve(covariances, np.stack([series, ones], axis=2))

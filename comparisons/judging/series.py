@@ -29,6 +29,8 @@ DIVERGING = 0.1
 """Least power of 1/dt, from one time step to the next, with which an error grows so that it may approach no value."""
 TWO_DIGITS = 0.01
 """Logarithms of errors that differ by less than this are equal, because errors near rounding have few digits."""
+HIGHEST_POWER = 4
+"""The effect of a start phase that falls faster than this power of the time step is that of an event which no start met at finer steps."""
 
 
 def verified(dts: ArrayLike, errors: ArrayLike, resolution: ArrayLike, rounding: ArrayLike) -> tuple[Array, Array, Array, Array]:
@@ -145,6 +147,17 @@ def grows_without_limit(dts: Array, errors: Array, noise: Array, large: float) -
     if not (np.isfinite(sizes).all() and sizes[1] > large):
         return False
     return bool(sizes[0] - sizes[1] > by_chance[:2].max() and np.all(np.diff(np.abs(sizes) * h) <= 0.0))
+
+
+def noise_of_missed(dts: Array, jumps: Array) -> Array:
+    """The noise at each time step of an event, such as a missed contact, that one start phase of many met at a coarser step, and none here.
+
+    Args:
+        dts: Time steps [s], shape (n,).
+        jumps: The effect of a single start phase on the mean over all of them, at each time step.
+    """
+    effects = np.where(dts[:, None] < dts, jumps * (dts[:, None] / dts) ** HIGHEST_POWER, 0.0)
+    return np.max(np.where(effects > jumps[:, None], jumps, 0.0), axis=1)
 
 
 def fitted_order(h: Array, rest: Array, small: Array) -> tuple[float, tuple[float, ...]]:

@@ -1,6 +1,7 @@
 """The error budget of series that mislead an extrapolation, and of arguments that are odd or invalid; all limits are closed forms."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -213,6 +214,20 @@ def test_noise_or_negligible_errors_without_bound_give_no_warning(option):
     """1e308 is a valid number: everything is within it."""
     found = ds.error_budget(H, [4.0, 2.0, 1.0], **{option: 1e308})
     assert found.cause == ("unresolved" if option == "resolution" else "discretisation")
+
+
+def test_interval_of_a_model_error_excludes_zero_also_where_a_little_is_negligible():
+    """It ended at what is negligible, where the interval of the asymptotic error alone contains 0."""
+    errors = [0.73605, 0.57697, 0.51268, 0.48242, 0.61987]
+    assert [ds.error_budget(FIVE, errors, negligible=floor).cause for floor in (0.0, 1e-6)] == ["unresolved", "unresolved"]
+
+
+@pytest.mark.parametrize("errors", [[1.0, 0.5, 0.25, 0.125, 0.0], [0.0, 0.5, 0.25, 0.125, 0.0625]])
+def test_error_without_a_sign_may_be_zero_at_a_step(errors):
+    """The weight of its square's series has the logarithm of the error."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert ds.error_budget(FIVE, errors, signed=False).cause == "unresolved"
 
 
 def test_time_step_without_an_error_needs_no_noise():

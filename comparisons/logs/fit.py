@@ -102,7 +102,7 @@ class LogFit:
         discrepancies: For each engine, the standard deviation [m] of differences from the recorded poses that neither noise nor errors of
             the initial state explain; with it, 90 % of the tosses are consistent.
         left_out: The engines that have no estimate, with the reason.
-        touches: Whether a body is near the floor of the header in any of these frames.
+        touches: Whether a body is near the floor of the header in any of these frames, or its bounce shows that it was between two.
         unlike: The engines whose discrepancy is large for the size of the body: their motions are not those of the tosses.
     """
 
@@ -160,7 +160,7 @@ def log_fit(
             friction = _of_all(parameter, bounded, size)
     discrepancies = {label: profile.discrepancy for label, profile in fitted.items()}
     unlike = tuple(label for label, left in discrepancies.items() if left > LARGE * body_length(flights.log.header.body))
-    touches = _touches(flights, problems[0])
+    touches = _touches(flights, problems[0]) or any(one.has_lower or one.has_upper for one in estimates)
     return LogFit(size, frames, tuple(estimates), tuple(transfers), friction, discrepancies, left_out, touches, unlike)
 
 

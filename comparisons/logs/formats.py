@@ -1,5 +1,6 @@
 """The columns of a recording's data as arrays, from CSV, Parquet, NPZ or MCAP; what is wrong with such a file is one line."""
 
+import codecs
 import io
 import json
 import warnings
@@ -29,7 +30,7 @@ NUMBERS = ("t", *POSITION, *ORIENTATION, *VELOCITY, *SPIN)
 REQUIRED = {*POSITION, *ORIENTATION}
 LARGEST_FILE = 200_000_000  # bytes
 MOST_ROWS = 1_000_000
-SEPARATORS = {";": "semicolons", "\t": "tabs"}
+SEPARATORS = {";": "semicolons", "\t": "tabs", " ": "spaces"}
 """That a table may have instead of commas."""
 LONGEST_NAME = 100
 """Characters of the name of a toss."""
@@ -57,6 +58,8 @@ def read_columns(path: Path, given: str, topic: str | None) -> tuple[dict[str, A
     if ending not in FORMATS:
         raise DropspinError(f"{given}: is not the data of a recording; give a file that ends in {', '.join(FORMATS)}.")
     raw = read_file(path, given, "recording", LARGEST_FILE)
+    if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise DropspinError(f"{given}: is text in UTF-16; save it as UTF-8.")
     try:
         columns = FORMATS[ending](raw, topic)
     except DropspinError as error:
@@ -96,9 +99,12 @@ def _verify_first_line(names: Sequence[str]) -> None:
     for number, name in enumerate(names):
         if not name:
             where = "the first line ends in a separator; leave it out there and in all rows"
-            raise DropspinError(f"column {number + 1} has no name{': ' + where if not any(names[number:]) else '; name it'}.")
+            other = "; leave it out, as the number of a row, or name it"
+            raise DropspinError(f"column {number + 1} has no name{': ' + where if not any(names[number:]) else other}.")
         if name in names[:number]:
-            raise DropspinError(f"column {shown(name)} is there twice; give each column once.")
+            raise DropspinError(
+                f"column {shown(name)} is there twice; give each column once, and the names of the columns in the first line alone."
+            )
 
 
 def _csv(raw: bytes, _topic: str | None) -> Columns:

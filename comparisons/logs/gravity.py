@@ -11,7 +11,7 @@ import numpy as np
 from dropspin.comparisons.logs.flight import ACCELERATION
 from dropspin.comparisons.logs.flights import Flights
 from dropspin.comparisons.logs.header import LENGTHS, TIMES, UPRIGHT, Header
-from dropspin.comparisons.logs.log import Cause, Finding, Log
+from dropspin.comparisons.logs.log import Cause, Finding, Log, frame_rate
 from dropspin.comparisons.logs.noise import Regression
 from dropspin.comparisons.logs.other_conventions import in_unit
 from dropspin.comparisons.logs.rest import rests
@@ -75,11 +75,11 @@ def _length_cause(header: Header, ratio: float) -> Cause:
 
 def _rate_cause(log: Log, ratio: float) -> Cause:
     """Accelerations that are too large by a ratio, by another unit of time, or by a wrong rate in the header or in the times."""
-    faster, rate = math.sqrt(ratio), 1.0 / float(np.median(np.concatenate([np.diff(toss.t) for toss in log.tosses])))
+    faster = math.sqrt(ratio)
     for unit, value in TIMES.items():
         if unit != log.header.time_unit and abs(ratio * (TIMES[log.header.time_unit] / value) ** 2 - 1.0) < UNIT:
             return Cause("time unit", keys={"time_unit": unit})
-    return Cause("rate", faster - 1.0, {"rate": float(f"{rate / faster:.4g}")} if log.header.rate is not None else {})
+    return Cause("rate", faster - 1.0, {} if log.has_times else {"rate": float(f"{frame_rate(log.tosses)[0] / faster:.4g}")})
 
 
 def gravity_interval(flights: Flights, drag: Regression, outside: float = 0.05) -> tuple[float, float]:
@@ -90,19 +90,27 @@ def gravity_interval(flights: Flights, drag: Regression, outside: float = 0.05) 
 
 
 def of_scale(flights: Flights, drag: Regression) -> Iterator[Finding]:
-    """Of gravity that is a little too large or small, or not vertical."""
+    """Of gravity that is a little too large or small, or not vertical.
+
+    If the axes are tilted, gravity is as large as the whole acceleration; if something pushes the body sideways, as its vertical part.
+    """
     header, found = flights.log.header, flights.moving
     x, fall, z = found.values[ACCELERATION].tolist()
     wide, (low, high) = found.half_widths(ALARM), gravity_interval(flights, drag, ALARM)
-    ratio = -fall / header.gravity
+    level = math.hypot(x, z)
+    is_tilted = level > math.hypot(wide[0], wide[2])
+    whole = math.hypot(fall, level) if is_tilted else -fall
+    high += whole + fall
+    gravity = min(-fall, whole, key=lambda size: abs(size - header.gravity))
+    ratio = gravity / header.gravity
     if not low <= header.gravity <= high and abs(ratio - 1.0) > LEAST_SCALE:
         at_rest, spread, _, _ = rests(flights.log).scale()
         by_length, by_rate = (abs(at_rest - expected) < 4.0 * spread + 0.004 for expected in (ratio, 1.0))
-        single = (_length_cause(header, ratio), _rate_cause(flights.log, ratio), _local(-fall))
+        single = (_length_cause(header, ratio), _rate_cause(flights.log, ratio), _local(gravity))
         causes = shown(*zip(single, (by_length, by_rate, by_rate), strict=True))
-        yield Finding("scale", -fall, header.gravity, causes=causes, rests=at_rest)
-    if math.hypot(x, z) > math.hypot(wide[0], wide[2]):
-        yield Finding("tilt", math.atan2(math.hypot(x, z), -fall), 0.0, causes=(Cause("axes"), Cause("push")))
+        yield Finding("scale", gravity, header.gravity, causes=causes, rests=at_rest)
+    if is_tilted:
+        yield Finding("tilt", math.atan2(level, -fall), 0.0, causes=(Cause("axes"), Cause("push")))
 
 
 def shown(*causes: tuple[Cause, bool]) -> tuple[Cause, ...]:

@@ -47,7 +47,10 @@ TIE = 1e-3
 
 
 class Problem(NamedTuple):
-    """What all engines are given: the tosses, and those from starts that differ by a standard deviation in each of 12 directions."""
+    """What all engines are given: the tosses, and those from starts that differ by a standard deviation in each of 12 directions.
+
+    Rotations are left out if no orientation changes: whoever records positions alone writes the same quaternion in all rows.
+    """
 
     measured: Array
     launched: Launches
@@ -84,8 +87,10 @@ def problem_of(flights: Flights, frames: int, steps: int) -> Problem:
     dt, moved = time_step(starts, steps), np.concatenate([start.moved(start.deviations) for start in starts])
     launched = launches(header, starts, np.array([start.state for start in starts]), dt, frames)
     perturbed = launches(header, [start for start in starts for _ in range(12)], moved, dt, frames)
-    noise = np.repeat([flights.moving.noise.white, header.body.size * flights.turning.noise.white], 3)
-    return Problem(recorded(starts, frames)[:, 1:], launched, perturbed, np.tile(noise**2, frames))
+    noises = [flights.moving.noise.white]
+    if any(np.ptp(start.toss.orientation, axis=0).any() for start in starts):
+        noises.append(header.body.size * flights.turning.noise.white)
+    return Problem(recorded(starts, frames)[:, 1:], launched, perturbed, np.tile(np.repeat(noises, 3) ** 2, frames))
 
 
 def profile_of(problem: Problem, entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> Profile | Breakdown:
@@ -115,10 +120,12 @@ def profile_of(problem: Problem, entry: EngineEntry, processes: EngineProcesses,
 
 
 def _differences(problem: Problem, reference: Array, found: Array) -> Array:
-    """Poses minus those of a reference, shape (m, frames, 7), without the first frame, in metres, shape (scenes, m, 6 frames)."""
+    """Poses minus those of a reference, shape (m, frames, 7), without the first frame, in metres, shape (scenes, m, variances)."""
     seen = found[:, :, 1:]
-    turned = problem.launched.scene.body.size * rotation_vector(reference[..., ORIENTATION], seen[..., ORIENTATION])
-    return np.concatenate([seen[..., POSITION] - reference[..., POSITION], turned], axis=-1).reshape(*seen.shape[:2], -1)
+    parts = [seen[..., POSITION] - reference[..., POSITION]]
+    if len(problem.variances) > parts[0][0, 0].size:
+        parts.append(problem.launched.scene.body.size * rotation_vector(reference[..., ORIENTATION], seen[..., ORIENTATION]))
+    return np.concatenate(parts, axis=-1).reshape(*seen.shape[:2], -1)
 
 
 def _losses(residuals: Array, derivatives: Array, variances: Array, axes: tuple[Array, ...]) -> tuple[Array, float]:

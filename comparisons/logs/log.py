@@ -5,7 +5,7 @@ What the file shows by itself, without the laws of motion, are facts: rows that 
 
 import math
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -131,6 +131,12 @@ class Log:
     origin: str
     irregularities: tuple[Finding, ...]
 
+    @property
+    def has_times(self) -> bool:
+        """Whether times were recorded; else they follow from the rate of the header."""
+        first = self.tosses[0].t
+        return self.header.rate is None or not np.allclose(first * self.header.rate, np.arange(len(first)), rtol=1e-9)
+
 
 def log_names() -> list[str]:
     """The names of the recordings that dropspin has."""
@@ -189,7 +195,7 @@ def _toss(where: str, header: Header, name: str, columns: dict[str, Array], rows
     if (off := np.abs(lengths - 1.0) > NEAR_UNIT).any():
         raise DropspinError(
             f"{where}: toss {name}: the quaternion of row {rows[np.argmax(off)] + 1} has length {lengths[np.argmax(off)]:.3g}; "
-            "give unit quaternions."
+            "give unit quaternions, and leave out rows without tracking."
         )
     upright, scale = np.array(UPRIGHT[header.up]), LENGTHS[header.length_unit] / header.length_scale
     orientation = quaternions / lengths[:, None]
@@ -215,9 +221,25 @@ def _irregularities(header: Header, tosses: list[Toss], poses: list[Array]) -> I
     for toss, rows in zip(tosses, poses, strict=True):
         yield from _repeated(toss.name, rows)
         yield from _uneven(toss)
-    rate = 1.0 / float(np.median(np.concatenate([np.diff(toss.t) for toss in tosses])))
-    if header.rate is not None and abs(rate / header.rate - 1.0) > OTHER_RATE:
+    rate, error = frame_rate(tosses)
+    if header.rate is not None and abs(rate / header.rate - 1.0) > OTHER_RATE + error:
         yield Finding("rate", rate, header.rate, causes=(Cause("times"), Cause("rate of the header", keys={"rate": rate})))
+
+
+def frame_rate(tosses: Sequence[Toss]) -> tuple[float, float]:
+    """The rate of the frames, with those that are missing [1/s], and its relative error by times that are rounded or uneven.
+
+    Over half of a toss, in the median, because rounded times have steps of which the usual one is not the mean.
+    """
+    rates, errors = [], []
+    for toss in tosses:
+        steps, half = np.diff(toss.t), len(toss) // 2
+        missing = missing_frames(steps)
+        frames = np.concatenate([[0], np.cumsum(1 + missing)])
+        spans = toss.t[half:] - toss.t[:-half]
+        rates.append((frames[half:] - frames[:-half]) / spans)
+        errors.append(float(np.ptp(steps[missing == 0]) / np.median(spans)))
+    return float(np.median(np.concatenate(rates))), float(np.median(errors))
 
 
 def _repeated(toss: str, rows: Array) -> Iterator[Finding]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,10 +27,18 @@ RESTS_NEAR = 0.02
 """Of the size of the body: how far above or below the floor it may rest, by errors of its own size and of tags."""
 ENDS_NEAR = 0.04
 """Of the size of the body: how far below the floor flights may end, the last frame of which may be one of a contact."""
+SINKS = 0.25
+"""Of the size of the body: how far below the floor it may be in the two frames after, in a contact that is soft."""
 SAME_SIZE = 0.02
 """Relative difference of heights on several faces from the expected ones, up to which the size of the body is right."""
 BAD_FRAMES = (1, 2, 3)
 """Numbers of bad frames that are tried."""
+CHANCE_ALONG_ONE = 58.6
+"""Squared distance over variance up to which chance may move a frame, if all noise is along one axis, as in depth of a single camera: three
+times χ² with one degree of freedom exceeds it once in 1e5.
+"""
+FILTERED = 8
+"""Frames before and after an impact, or from the first one on, that a filter of positions may have moved off the flight."""
 CLEAR = 20.0
 """Turn or way of a flight, over the noise, from which the ratio of its recorded rates to those of the motion is known."""
 DEGREE, BETTER = 5, 1.02
@@ -162,7 +171,7 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
     held, flown = {one.toss: one.frame for one in irregularities if "repeated" in one.kind}, {flight.toss.name for flight in flights.found}
     uneven = any(finding.kind == "jitter" for finding in irregularities)  # of which frames seem off their flight
     above = {} if uneven else _in_mid_air(flights)
-    noise, mid_air = noise_of(flights.log), {name: height for name, height in above.items() if name not in held}
+    noise, mid_air = noise_of(flights.log), {name: ends for name, ends in above.items() if name not in held}
     for toss in flights.log.tosses:
         if toss.name not in flown | held.keys():
             yield Finding("no flight", 0.0, window_size(toss, noise, flights.moving.values[ACCELERATION]), toss.name)
@@ -179,15 +188,18 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
             bad = 0 if missing else _interrupted(part, flights.moving.values, own, by_bad_frames=True)
             frame = flight.end + 1 if part is flight else flight.first - 1 - bad
             if missing or bad:
-                if held.get(flight.toss.name) != frame and (missing or not uneven):
+                by_chance = uneven or surprise(part, part.end + 1, flights.moving.values, own) < CHANCE_ALONG_ONE
+                if held.get(flight.toss.name) != frame and (missing or not by_chance):
                     yield Finding("frame dropped" if missing else "bad frame", missing or bad, 0.0, flight.toss.name, frame)
             elif part is flight and flight.toss.name in mid_air:
-                causes = (Cause("frames missing"), Cause("touched"))
-                yield Finding("mid-air", mid_air[flight.toss.name], 0.0, flight.toss.name, flight.end - 1, causes)
+                height, is_near = mid_air[flight.toss.name]
+                causes = (Cause("frames missing"), Cause("touched"), *[Cause("filter")] * is_near)
+                yield Finding("mid-air", height, 0.0, flight.toss.name, flight.end - 1, causes)
             elif part is flight and flight.toss.name in leaps:
                 yield Finding("leap", 0.0, 0.0, flight.toss.name, leaps[flight.toss.name])
             elif part is not flight and flight.first > 2 and flight.toss.name not in held:
-                yield Finding("late", flight.first, 0.0, flight.toss.name, flight.first, (Cause("held"), Cause("earlier impact")))
+                causes = (Cause("held"), Cause("earlier impact"), *[Cause("filter")] * (flight.first <= FILTERED))
+                yield Finding("late", flight.first, 0.0, flight.toss.name, flight.first, causes)
 
 
 def _interrupted(flight: Flight, shared: Array, noise: Noise, *, by_bad_frames: bool) -> int:
@@ -222,19 +234,21 @@ def _continued(flight: Flight, shared: Array, t: Array, orientation: Array) -> A
     return np.asarray(start + velocity * t + shared[ACCELERATION] * t**2 / 2.0 + rotate(orientation, shared[OFFSET]))
 
 
-def _in_mid_air(flights: Flights) -> dict[str, float]:
+def _in_mid_air(flights: Flights) -> dict[str, tuple[float, bool]]:
     """How high the flights end that would not be near the floor three frames after their last one [m], by the name of the toss.
 
-    Empty if these are more than half of the flights: the floor is elsewhere then.
+    With it, whether they would be `FILTERED` frames after it.
+
+    Empty if these are more than half of the flights, and may end on one floor, which is elsewhere then.
     """
     header, found = flights.log.header, {}
     for rotor in flights.rotations if header.floor is not None else ():
         flight, toss = rotor.flight, rotor.flight.toss
-        t = toss.t[flight.end - 1] - toss.t[flight.first] + np.arange(4) * toss.time_step
+        t = toss.t[flight.end - 1] - toss.t[flight.first] + np.arange(1 + FILTERED) * toss.time_step
         above = heights(header, _continued(flight, flights.moving.values, t, rotor(t)[0]), rotor(t)[0])
-        if flight.end < len(toss) and above.min() > NEAR_FLOOR * header.body.size:
-            found[toss.name] = float(above[0])
-    return found if 2 * len(found) <= len(flights.found) else {}
+        if flight.end < len(toss) and above[:4].min() > NEAR_FLOOR * header.body.size:
+            found[toss.name] = float(above[0]), bool(above.min() < NEAR_FLOOR * header.body.size)
+    return found if 2 * len(found) <= len(flights.found) or rests(flights.log).are_apart(header.body.size) else {}
 
 
 def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:
@@ -246,16 +260,17 @@ def of_floor(flights: Flights, alarm: float) -> Iterator[Finding]:
     """
     header, found, resting = flights.log.header, flights.moving, rests(flights.log)
     above, error = resting.above()
-    if header.floor is None:
+    if header.floor is None or resting.are_apart(header.body.size):
         return
     if not flights.show_offset.all() or not math.isfinite(above):
         flown = [heights_in(header, flight) for flight in flights.found]
         height, toss = min((float(one.max()), flight.toss.name) for one, flight in zip(flown, flights.found, strict=True))
+        landed = [heights_in(header, replace(flight, end=min(flight.end + 2, len(flight.toss)))).min() for flight in flights.found]
         deep = 4.0 * found.noise.white + ENDS_NEAR * header.body.size
         if height < 0.0:
             yield Finding("below", -height, 0.0, toss)
-        elif (median := float(np.median([one[-1] for one in flown]))) < -deep:
-            yield Finding("end below", -median, 0.0)
+        elif (end := float(np.median([one[-1] for one in flown]))) < -deep or (end := float(np.median(landed))) < -SINKS * header.body.size:
+            yield Finding("end below", -end, 0.0)
         return
     wide, off = found.half_widths(alarm), header.tracked_from_centre - found.values[OFFSET]
     by_scale = (abs(found.values[1] / header.gravity + 1.0) + wide[1] / header.gravity) * float(np.mean(np.abs(resting.expected)))

@@ -26,6 +26,8 @@ FEWEST_RESTS = 6
 """Rests that the scale and three components of δ need."""
 OTHER_FACE = 0.05
 """Difference of the expected heights, as a share of the size of the body, from which on it rests on several faces."""
+UNEXPLAINED = 0.3
+"""Share of a large scatter of heights from which on a wrong scale of the lengths does not explain it."""
 LEVEL = 0.04
 """Heights of vertices, as a share of the size of the body, that count as equal: a turn of 2 degrees."""
 
@@ -71,6 +73,15 @@ class Rests(NamedTuple):
         """The standard deviation of the heights from the expected ones [m]; NaN with fewer than `FEWEST_RESTS`."""
         above = self.heights - self.expected
         return float(np.std(above, ddof=1)) if len(above) >= FEWEST_RESTS else np.nan
+
+    def are_apart(self, size: float) -> bool:
+        """Whether they are on no common floor, but in a hand or on a table; wrong lengths spread heights as the expected ones.
+
+        `size` is that of the body [m].
+        """
+        slope, _ = self.stretch(size)
+        left = self.heights if math.isnan(slope) else self.heights - slope * self.expected
+        return self.scatter > size and float(np.std(left)) > UNEXPLAINED * self.scatter
 
     def above(self) -> tuple[float, float]:
         """The median height of the lowest points above the floor [m], and its standard error; NaN with fewer than `FEWEST_RESTS`."""

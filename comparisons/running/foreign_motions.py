@@ -60,7 +60,7 @@ def problems_of_order(t: Array) -> Iterator[str]:
     steps = np.diff(t)
     if not (steps > 0.0).all():
         row = int(np.argmin(steps > 0.0))
-        remedy = "leave out one of the two states" if steps[row] == 0.0 else "give the states in the order of time"
+        remedy = "leave out one of the two states, or give more digits" if steps[row] == 0.0 else "give the states in the order of time"
         yield f"the times do not increase: {t[row + 1]:.6g} s is after {t[row]:.6g} s; {remedy}"
 
 

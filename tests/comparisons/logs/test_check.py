@@ -18,7 +18,7 @@ from dropspin.comparisons.logs.noise import Noise, Regression
 from dropspin.comparisons.logs.recording_faults import _in_mid_air, of_frames, of_rates, ratios_of_rates
 from dropspin.reports.stories.log_findings import corrections, sentence
 from dropspin.scenarios.errors import DropspinError
-from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
+from dropspin.scenarios.rotations import about, conjugate, multiply, rotate, unrotate
 from dropspin.scenarios.state import UP, Array
 from dropspin.scenarios.validation import validated
 
@@ -302,6 +302,38 @@ def test_a_rate_that_is_far_off_is_measured_and_told_from_lengths_by_the_heights
     assert found.causes[0].share == pytest.approx(0.989 * faster - 1.0, abs=0.01)
 
 
+def test_a_rate_in_the_header_corrects_nothing_where_times_were_recorded() -> None:
+    found = only(log_check(changed(sound(), t=lambda toss: 1.03 * toss.t)))
+    causes = {cause.name: cause.keys for cause in found.causes}
+    assert (found.kind, causes["rate"]) == ("unit", {})
+
+
+@pytest.mark.parametrize("tilt", [2.0, 5.0])
+def test_tilted_axes_are_no_wrong_scale(tilt: float) -> None:
+    """Gravity along the vertical axis is smaller by 1 - cos."""
+    log = sound(count=12, durations=(0.4, 0.6))
+    turn = about(np.array([1.0, 0.0, 0.0]), np.radians(tilt))
+    wrong = changed(log, position=lambda toss: rotate(turn, toss.position), orientation=lambda toss: multiply(turn, toss.orientation))
+    assert [finding.kind for finding in log_check(wrong).findings] == ["tilt"]
+
+
+@pytest.mark.parametrize("caught", [6, 12])
+def test_bodies_that_are_caught_in_mid_air_do_not_move_the_floor(caught: int) -> None:
+    """They are still in a hand from frame 30 on, at heights that no floor explains."""
+    random = np.random.default_rng(3)
+
+    def position(toss: Toss) -> Array:
+        frames = np.arange(len(toss))
+        shaken = np.where(frames > 30, NOISE[0], 0.0)[:, np.newaxis] * random.normal(size=toss.position.shape)
+        return toss.position[np.minimum(frames, 30)] + shaken if int(toss.name) < caught else toss.position
+
+    def orientation(toss: Toss) -> Array:
+        return toss.orientation[np.minimum(np.arange(len(toss)), 30 if int(toss.name) < caught else len(toss))]
+
+    found = log_check(changed(striking_floor(12)[1], position=position, orientation=orientation)).findings
+    assert {(one.kind, int(one.toss)) for one in found} == {("mid-air", toss) for toss in range(caught)}
+
+
 @pytest.mark.parametrize(
     ("lengths", "times", "keys"),
     [
@@ -312,7 +344,8 @@ def test_a_rate_that_is_far_off_is_measured_and_told_from_lengths_by_the_heights
 )
 def test_heights_at_rest_tell_the_part_of_the_lengths_from_that_of_the_times(lengths: float, times: float, keys: Any) -> None:
     log = with_rests(sound(count=8, body=BRICK))
-    wrong = changed(log, t=lambda toss: times * toss.t, position=lambda toss: lengths * toss.position)
+    slower = replace(log, header=log.header.model_copy(update={"rate": 148.0 / times}))
+    wrong = changed(slower, t=lambda toss: times * toss.t, position=lambda toss: lengths * toss.position)
     found = [finding for finding in log_check(wrong).findings if finding.kind == "unit"]
     assert [finding.causes[0].keys for finding in found] == keys
 
@@ -649,6 +682,24 @@ def test_flights_that_end_below_the_floor_are_a_finding_without_rests(depth: flo
     findings = log_check(replace(log, tosses=tuple(moved))).findings
     assert [one.kind for one in findings] == kinds
     assert all(0.03 < one.value < 0.07 for one in findings)
+
+
+def test_a_tracked_point_that_reaches_the_floor_is_found_where_the_body_strikes_it() -> None:
+    """That of a ball that is tracked at its lowest point: frames before the impact are above the floor, those of the impact below."""
+    ball = {"shape": "sphere", "radius": 0.02, "mass": 0.003}
+    header = Header.model_validate({"data": "made", "rate": 240.0, "body": ball, "floor": {"restitution": 0.8, "friction": 0.3}})
+    t, random = np.arange(130) / 240.0, np.random.default_rng(1)
+    tosses = []
+    for number in range(8):
+        landing = 0.3 + 0.02 * random.uniform()
+        height = np.where(t < landing, 4.905 * (landing**2 - t**2), (t - landing) * (0.8 * 9.81 * landing - 4.905 * (t - landing)))
+        position = np.stack([0.2 * t, height, 0.0 * t], axis=1) + 2e-4 * random.normal(size=(len(t), 3))
+        tosses.append(Toss(str(number), t, position, np.tile([0.0, 0.0, 0.0, 1.0], (len(t), 1))))
+    found = only(log_check(Log(header, tuple(tosses), "ball", ())))
+    assert found.kind == "end below"
+    assert 0.01 < found.value < 0.02
+    right = changed(Log(header, tuple(tosses), "ball", ()), position=lambda toss: toss.position + 0.02 * UP)
+    assert log_check(right).findings == ()
 
 
 @pytest.mark.sample(1)

@@ -201,7 +201,7 @@ WRONG = {
     "semicolons": ({";".join(POSE): T}, "column 't;x;y;z;qx;qy;qz;qw' is unknown: semicolons separate the values; separate them by commas"),
     "tabs": ({"\t".join(POSE): T}, "is unknown: tabs separate the values; separate them by commas"),
     "no name": (changed(t=None) | {"": T}, "toss.csv: column 8 has no name: the first line ends in a separator; leave it out there"),
-    "no name within": ({"": T} | POSE, "toss.csv: column 1 has no name; name it"),
+    "no name within": ({"": T} | POSE, "toss.csv: column 1 has no name; leave it out, as the number of a row, or name it"),
     "a name twice": ({" x": T} | POSE, "toss.csv: column 'x' is there twice; give each column once"),
     "times that look equal": (
         with_times(lambda t: t.__setitem__(5, t[4] - 1e-9)),
@@ -237,6 +237,21 @@ def test_values_without_a_name_are_refused(tmp_path):
     text = (tmp_path / "toss.csv").read_text()
     (tmp_path / "toss.csv").write_text("\n".join([line + ",0" if number else line for number, line in enumerate(text.splitlines())]))
     with pytest.raises(DropspinError, match=r"toss\.csv: rows have more values than the first line has names; name every column\.$"):
+        load_log(header)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("t,x,y".encode("utf-16"), "is text in UTF-16; save it as UTF-8"),
+        (b"# timestamp tx ty tz\n0.0 1 2 3\n", "spaces separate the values; separate them by commas"),
+        (b"format,1.2,rate,240,240\nt,x,y,z\n", "column '240' is there twice; .* and the names of the columns in the first line alone"),
+    ],
+)
+def test_exports_of_other_programs_are_refused_with_what_to_do(tmp_path, content, message):
+    header = written(tmp_path, POSE)
+    (tmp_path / "toss.csv").write_bytes(content)
+    with pytest.raises(DropspinError, match=message):
         load_log(header)
 
 
@@ -356,6 +371,16 @@ def test_long_steps_of_uneven_times_are_no_missing_frames(tmp_path):
     steps = 0.01 * np.random.default_rng(1).uniform(0.4, 1.8, FRAMES - 1)
     log = load_log(written(tmp_path, POSE | {"t": np.concatenate([[0.0], np.cumsum(steps)])}, {}))
     assert {finding.kind for finding in log.irregularities} == {"jitter"}
+
+
+@pytest.mark.parametrize(("rate", "digits"), [(240.0, 3), (120.0, 3), (30.0, 2)])
+def test_rounded_times_have_the_rate_of_their_mean_step(tmp_path, rate, digits):
+    """At 240 frames per second, most steps of times in whole milliseconds are of 4 ms."""
+    columns = POSE | {"t": np.round(np.arange(FRAMES) / rate, digits)}
+    assert "rate" not in {finding.kind for finding in load_log(written(tmp_path, columns, {"rate": rate})).irregularities}
+    wrong = load_log(written(tmp_path, columns, {"rate": 1.1 * rate}))
+    [found] = [finding for finding in wrong.irregularities if finding.kind == "rate"]
+    assert found.value == pytest.approx(rate, rel=0.02)
 
 
 def test_repeated_rows_missing_frames_uneven_times_and_another_rate_are_facts(tmp_path):

@@ -163,10 +163,7 @@ def _residual(flights: Flights, *, equal_steps: bool) -> float:
 
 def of_frames(flights: Flights) -> Iterator[Finding]:
     """Of frames that are missing or repeated, of tosses without a flight, and of what the file shows by itself."""
-    irregularities = flights.log.irregularities
-    if any(finding.kind == "jitter" for finding in irregularities):
-        times_are_right = _residual(flights, equal_steps=False) <= BETTER * _residual(flights, equal_steps=True)
-        irregularities = tuple(finding for finding in irregularities if finding.kind != "jitter" or not times_are_right)
+    irregularities = _irregularities(flights)
     yield from irregularities
     held, flown = {one.toss: one.frame for one in irregularities if "repeated" in one.kind}, {flight.toss.name for flight in flights.found}
     uneven = any(finding.kind == "jitter" for finding in irregularities)  # of which frames seem off their flight
@@ -176,30 +173,45 @@ def of_frames(flights: Flights) -> Iterator[Finding]:
         if toss.name not in flown | held.keys():
             yield Finding("no flight", 0.0, window_size(toss, noise, flights.moving.values[ACCELERATION]), toss.name)
     after = flights.afterwards if flights.log.header.floor is not None and not uneven else []  # of other flights nothing more is used
-    leaps = {
-        one.rotor.flight.toss.name: frame for one in after if (frame := leap(one)) is not None and one.rotor.flight.toss.name not in held
-    }
+    leaps = {one.rotor.flight.toss.name: leap(one) for one in after if one.rotor.flight.toss.name not in held}
     for flight, weight, again in zip(flights.found, flights.moving.weights, flights.moved_again, strict=True):
         if after and again is not None:
             yield Finding("moved again", 0.0, 0.0, flight.toss.name, again)
         own = flights.moving.noise.of_weight(min(weight, 1.0))
         for part in (flight.backwards(), flight):
-            missing = _interrupted(part, flights.moving.values, own, by_bad_frames=False)
-            bad = 0 if missing else _interrupted(part, flights.moving.values, own, by_bad_frames=True)
+            missing, bad, by_chance = _at_end(part, flights.moving.values, own)
             frame = flight.end + 1 if part is flight else flight.first - 1 - bad
             if missing or bad:
-                by_chance = uneven or surprise(part, part.end + 1, flights.moving.values, own) < CHANCE_ALONG_ONE
-                if held.get(flight.toss.name) != frame and (missing or not by_chance):
+                if held.get(flight.toss.name) != frame and (missing or not (uneven or by_chance)):
                     yield Finding("frame dropped" if missing else "bad frame", missing or bad, 0.0, flight.toss.name, frame)
+            elif by_chance:
+                pass
             elif part is flight and flight.toss.name in mid_air:
                 height, is_near = mid_air[flight.toss.name]
                 causes = (Cause("frames missing"), Cause("touched"), *[Cause("filter")] * is_near)
                 yield Finding("mid-air", height, 0.0, flight.toss.name, flight.end - 1, causes)
-            elif part is flight and flight.toss.name in leaps:
-                yield Finding("leap", 0.0, 0.0, flight.toss.name, leaps[flight.toss.name])
+            elif part is flight and (missed := leaps.get(flight.toss.name)) is not None:
+                yield Finding("leap", 0.0, 0.0, flight.toss.name, missed)
             elif part is not flight and flight.first > 2 and flight.toss.name not in held:
                 causes = (Cause("held"), Cause("earlier impact"), *[Cause("filter")] * (flight.first <= FILTERED))
                 yield Finding("late", flight.first, 0.0, flight.toss.name, flight.first, causes)
+
+
+def _irregularities(flights: Flights) -> tuple[Finding, ...]:
+    """Those of the file, without uneven times that the motion shows to be right."""
+    found = flights.log.irregularities
+    if not any(finding.kind == "jitter" for finding in found):
+        return found
+    times_are_right = _residual(flights, equal_steps=False) <= BETTER * _residual(flights, equal_steps=True)
+    return tuple(finding for finding in found if finding.kind != "jitter" or not times_are_right)
+
+
+def _at_end(flight: Flight, shared: Array, noise: Noise) -> tuple[int, int, bool]:
+    """How many frames are missing after a flight, or bad, and whether chance alone may have moved those after it off the flight."""
+    missing = _interrupted(flight, shared, noise, by_bad_frames=False)
+    bad = 0 if missing else _interrupted(flight, shared, noise, by_bad_frames=True)
+    beyond = range(flight.end, min(flight.end + (1 + bad if bad else FILTERED), len(flight.toss)))
+    return missing, bad, all(surprise(flight, frame, shared, noise) < CHANCE_ALONG_ONE for frame in beyond)
 
 
 def _interrupted(flight: Flight, shared: Array, noise: Noise, *, by_bad_frames: bool) -> int:

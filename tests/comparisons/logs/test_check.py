@@ -11,7 +11,9 @@ from support.tosses import BRICK, CUBE, Made, made, turned
 from dropspin.comparisons.logs import check as checks
 from dropspin.comparisons.logs import falling
 from dropspin.comparisons.logs.check import CENTRES, RATIOS, Check, log_check
+from dropspin.comparisons.logs.continued_tosses import flights_in
 from dropspin.comparisons.logs.flights import Flights, flights_of, heights
+from dropspin.comparisons.logs.grids import problem_of
 from dropspin.comparisons.logs.header import UPRIGHT, Header
 from dropspin.comparisons.logs.log import Finding, Log, Toss, load_log
 from dropspin.comparisons.logs.noise import Noise, Regression
@@ -684,6 +686,28 @@ def test_flights_that_end_below_the_floor_are_a_finding_without_rests(depth: flo
     assert all(0.03 < one.value < 0.07 for one in findings)
 
 
+def test_noise_in_depth_alone_makes_no_bad_frames() -> None:
+    """A single camera measures along its axis ten times less exactly than across it."""
+    random = np.random.default_rng(1)
+    log = made(1, 12, (2e-4, 5e-3), rate=240.0, durations=(0.3, 0.4), header={"body": CUBE}).log
+    depth = np.array([0.0, 0.0, 3e-3])
+    wrong = changed(log, position=lambda toss: toss.position + depth * random.normal(size=toss.position.shape))
+    assert log_check(wrong).findings == ()
+
+
+def test_a_filter_may_end_a_flight_early() -> None:
+    """A mean of five frames."""
+
+    def smoothed(toss: Toss) -> Array:
+        padded = np.pad(toss.position, ((2, 2), (0, 0)), mode="edge")
+        return np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0).mean(axis=-1)
+
+    found = log_check(changed(striking_floor(8)[1], position=smoothed)).findings
+    assert {one.kind for one in found} <= {"late", "mid-air"}
+    assert found
+    assert all("filter" in {cause.name for cause in one.causes} for one in found)
+
+
 def test_a_tracked_point_that_reaches_the_floor_is_found_where_the_body_strikes_it() -> None:
     """That of a ball that is tracked at its lowest point: frames before the impact are above the floor, those of the impact below."""
     ball = {"shape": "sphere", "radius": 0.02, "mass": 0.003}
@@ -700,6 +724,8 @@ def test_a_tracked_point_that_reaches_the_floor_is_found_where_the_body_strikes_
     assert 0.01 < found.value < 0.02
     right = changed(Log(header, tuple(tosses), "ball", ()), position=lambda toss: toss.position + 0.02 * UP)
     assert log_check(right).findings == ()
+    # Orientations that never change are not compared: there are three numbers in each of 8 frames.
+    assert len(problem_of(flights_in(right), 8, 4).variances) == 24
 
 
 @pytest.mark.sample(1)

@@ -51,7 +51,7 @@ BEYOND = (
 INTO_FLOOR = "restitution has the wrong sign: the contact point goes on into the floor"
 OF_REBOUND = (IN_NORMAL, INTO_FLOOR)
 AT_START = "the inertia is rotated by the orientation at the start: in the world frame it is R I Rᵀ with the R of the impact"
-NO_TURN = "the impulse does not turn the body: I⁻¹ (r × j) is not added to the angular velocity"
+NO_TURN = "the impulse does not turn the body: I⁻¹ (r × j) is not added to the angular velocity, or friction against rolling undoes it"
 POINT_MASS = "the impulse is that of a point mass: K = 1/M - r* I⁻¹ r* lacks its second term"
 BY_SLIP = "friction reduces the slip by at most µ (1 + e) times the approach speed, which follows from Coulomb's law for a point mass only"
 OF_NOTE = (

@@ -60,7 +60,7 @@ def check_motion(engine: Engine, probe: Probe) -> str:
 def _verify_impacts(engine: Engine, probe: Probe, motion: Trajectory) -> None:
     """Raise an exception for a mistake in an impact, or if restitution decays, by which another fault could seem to explain the motion."""
     mistake = explain_impact(probe.scene, motion)
-    if mistake in OF_REBOUND and _rebounds_rightly(engine, probe):
+    if (mistake in OF_REBOUND and _rebounds_rightly(engine, probe)) or (mistake == OF_NOTE and not _follows_note(engine, probe)):
         mistake = None
     is_stated = mistake == OF_NOTE and "law note" in (engine.discretisation(probe.scene) or "")  # the motion then differs otherwise
     if mistake is not None and not is_stated:
@@ -77,6 +77,16 @@ def _rebounds_rightly(engine: Engine, probe: Probe) -> bool:
         if is_alike and (states := _states(engine, other)) is not None and other.off(states, other.exact) <= 1.0:
             return True
     return False
+
+
+def _follows_note(engine: Engine, probe: Probe) -> bool:
+    """Whether the body follows the law of the note with a spin too; without one, a floor that grips gives the same impact."""
+    for scene in (other.scene for other in PROBES):
+        if scene.body == probe.scene.body and scene.floor == probe.scene.floor and any(scene.start.angular_velocity):
+            recording = try_record(engine, scene, DT, verify=False)
+            if not isinstance(recording, Breakdown) and explain_impact(scene, recording.motion) != OF_NOTE:
+                return False
+    return True
 
 
 def _states(engine: Engine, probe: Probe) -> Array | None:
@@ -115,15 +125,18 @@ def explain_motion(probe: Probe, states: Array, motion_of: Callable[[Probe], Arr
     """
     # The exact solution of a box on its corner takes too long for thousands of pairs.
     shapes = {*Engine.shapes, probe.scene.body.shape}
+    alone: list[Array] = []  # a pair is no explanation if one of its faults changes nothing here, and the other one is excluded
     for faults in (SINGLY, PAIRS) if _has_pairs(probe) else (SINGLY,):
         motions = _motions(probe, faults)
         off = dict(zip(motions, np.round(probe.off(states, np.array([*motions.values()])), 3), strict=True))
         candidates = sorted((fault for fault in motions if off[fault] <= 1.0), key=off.__getitem__)
+        candidates = [fault for fault in candidates if not any(probe.off(motions[fault], one) <= 1.0 for one in alone)]
         known = PROBES if faults is SINGLY else list(filter(_has_pairs, PROBES))
         others = [other for other in known if other != probe and other.scene.body.shape in shapes]
         best = _best(candidates, others, motion_of, is_pair=faults is PAIRS)
         if best is not None:
             return best
+        alone = [motions[fault] for fault in candidates]
     return None
 
 

@@ -280,15 +280,20 @@ def _errors_of(scene: Scenario, metric: Metric, series: Sequence[SeriesPoint], p
     if metric.unit == "rad":
         errors[np.abs(errors) > SATURATION] = math.nan
     if metric.name == "position_error" and scene.starts_above_floor and scene.recording is None:
-        is_sideways = [_sideways(point, part[0]) >= SIDEWAYS * abs(error) for point, error in zip(series, errors, strict=True)]
+        is_sideways = [_is_sideways(point, part[0]) for point in series]
         errors[(np.abs(errors) > DESYNCHRONISED * scene.clearance) & ~np.array(is_sideways)] = math.nan
     return errors, resolutions
 
 
-def _sideways(point: SeriesPoint, flight: int) -> float:
-    """The horizontal length of the mean position error at the end of the middle half of a flight [m]; 0 if it is not known."""
+def _is_sideways(point: SeriesPoint, flight: int) -> bool:
+    """Whether the mean position error at the end of the middle half of a flight is horizontal; False if it is not known."""
     components = None if point.components is None else point.components.parts
-    return 0.0 if components is None or flight >= len(components) else float(np.hypot(components[flight, 0], components[flight, 2]))
+    if components is None or not len(components):
+        return False
+    # The average may have one part for all flights, and the components one for each.
+    is_of_each = len(components) == len(point.average.parts)
+    error = components[flight if is_of_each else int(np.argmax(np.linalg.norm(components, axis=1)))]
+    return bool(np.hypot(error[0], error[2]) >= SIDEWAYS * np.linalg.norm(error) > 0.0)
 
 
 def _budget_of_components(

@@ -213,6 +213,32 @@ def test_law_of_the_note_is_recognised_where_it_is_not_stated():
     assert found(engine_, "corner") == {"corner": OF_NOTE}
 
 
+def test_friction_on_a_floor_without_any_is_not_the_law_of_the_note():
+    """The floor grips a box that strikes it on a corner without a spin, and the velocities are those of the note's law."""
+
+    def gripping(self, K, u, u_normal):
+        impulse = np.linalg.solve(K, -self.restitution * u_normal * UP - u)
+        along = impulse - (impulse @ UP) * UP
+        most = 0.2 * (impulse @ UP) if self.w.any() else np.inf  # it slips with a spin
+        return impulse - along * (1.0 - min(1.0, most / (np.linalg.norm(along) or 1.0)))
+
+    engine_ = student(impulse=gripping)
+    type(engine_).discretisation = lambda self, scene: None
+    messages = found(engine_, "corner", "spinning corner")
+    assert OF_NOTE not in messages.values()
+    assert "friction" in messages["corner"]
+    assert "friction" in messages["spinning corner"]
+
+
+def test_fault_that_a_box_excludes_does_not_return_beside_one_that_changes_nothing():
+    """Balls do not rebound, boxes do: restitution is not 0 for every scene, neither alone nor with a damping that no scene has."""
+    of_balls = {"wanted_normal": lambda self, u: -(1.0 + (self.restitution if self.radius == 0.0 else 0.0)) * u}
+    messages = found(student(**of_balls), "bouncing ball", "dull ball", "bouncing box")
+    assert set(messages) == {"bouncing ball", "dull ball"}
+    assert messages["bouncing ball"].startswith("restitution is 0")
+    assert not [text for text in messages.values() if "every scene" in text or "damping" in text]
+
+
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("name", ["wang", "mujoco", "mujoco[kappa=0.5]", "pybullet", "pybullet[coordinates=multibody]", "rapier", "dart"])
 def test_no_mistake_is_named_in_a_right_engine(name):

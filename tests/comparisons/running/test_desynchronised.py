@@ -113,3 +113,19 @@ def test_body_beside_its_place_is_not_in_another_flight():
     found = ds.run(scene, Beside()).asymptotic_errors("model").set_index("metric")
     assert found.loc["position_error", "verdict"] == "failed"
     assert found.loc["position_error", "value"] == pytest.approx(2.0, rel=1e-9)
+
+
+class InCentimetres(made.Exact):
+    """The first coordinate of the position is a hundred times as large, at every time step."""
+
+    name = "in-centimetres"
+
+    def prepare(self, scene, dt):
+        return made.ExactSimulation(scene, dt, lambda row, _: row * np.where(np.arange(13) == 0, 100.0, 1.0))
+
+
+def test_body_that_leaves_its_place_sideways_is_not_in_another_flight():
+    """The error grows from flight to flight; that of the first one, before the body moves sideways, is 0."""
+    rows = ds.run("drop-ball-slipping", InCentimetres()).asymptotic_errors("model").set_index("metric")
+    assert rows.loc["position_error", "verdict"] == "failed"
+    assert rows.loc["position_error", "value"] == pytest.approx(47.6, rel=0.01)

@@ -280,19 +280,15 @@ def _errors_of(scene: Scenario, metric: Metric, series: Sequence[SeriesPoint], p
     if metric.unit == "rad":
         errors[np.abs(errors) > SATURATION] = math.nan
     if metric.name == "position_error" and scene.starts_above_floor and scene.recording is None:
-        is_sideways = [_is_sideways(point, part[0]) for point in series]
-        errors[(np.abs(errors) > DESYNCHRONISED * scene.clearance) & ~np.array(is_sideways)] = math.nan
+        is_sideways = np.array(list(map(_is_sideways, series)))
+        errors[(np.abs(errors) > DESYNCHRONISED * scene.clearance) & ~is_sideways] = math.nan
     return errors, resolutions
 
 
-def _is_sideways(point: SeriesPoint, flight: int) -> bool:
-    """Whether the mean position error at the end of the middle half of a flight is horizontal; False if it is not known."""
-    components = None if point.components is None else point.components.parts
-    if components is None or not len(components):
-        return False
-    # The average may have one part for all flights, and the components one for each.
-    is_of_each = len(components) == len(point.average.parts)
-    error = components[flight if is_of_each else int(np.argmax(np.linalg.norm(components, axis=1)))]
+def _is_sideways(point: SeriesPoint) -> bool:
+    """Whether the mean position error at the end of the middle half of a flight, where it is longest, is horizontal; False if unknown."""
+    errors = [] if point.components is None else list(point.components.parts)
+    error = max(errors, key=np.linalg.norm, default=np.zeros(3))
     return bool(np.hypot(error[0], error[2]) >= SIDEWAYS * np.linalg.norm(error) > 0.0)
 
 

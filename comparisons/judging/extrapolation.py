@@ -70,9 +70,7 @@ SMALLEST_SCALE, LARGEST_SCALE, SCALES_PER_DECADE = 1e-3, 10.0, 2
 NEGLIGIBLE_WEIGHT = 1e-3
 """The least likely forms, whose total weight is this, are left out."""
 CREDIBLE = 0.99
-"""Probability of the interval in this model, given that m is not 0. It exceeds the stated 95 %, to allow for series that no form
-describes.
-"""
+"""Probability of the interval in this model, given that m is not 0: more than 95 %, because some series are described by no form."""
 
 
 class _Forms(NamedTuple):
@@ -171,8 +169,8 @@ def extrapolate(
     parts = [_fit(forms, errors, noise)]
     if not signed:
         squares = _fit(forms, errors**2, 2.0 * np.abs(errors) * noise + noise**2)
-        least = np.maximum(noise, RELATIVE_ROUNDING * np.max(np.abs(errors)))  # an error may be 0
-        log_weights = squares.log_weights + np.sum(np.log(2.0 * np.maximum(np.abs(errors), least)))
+        sizes = np.maximum(np.abs(errors), np.maximum(noise, RELATIVE_ROUNDING * np.max(np.abs(errors))))  # an error may be 0
+        log_weights = squares.log_weights + np.sum(np.log(2.0 * sizes))
         log_weights[forms.orders < 2.0 * ORDERS[0], 0] = -np.inf  # the square of an error that vanishes has twice its order
         parts.append(squares._replace(log_weights=log_weights))
     return _posterior(parts, forms, len(h))

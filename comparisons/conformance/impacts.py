@@ -50,6 +50,7 @@ BEYOND = (
 )
 INTO_FLOOR = "restitution has the wrong sign: the contact point goes on into the floor"
 OF_REBOUND = (IN_NORMAL, INTO_FLOOR)
+OF_CENTRE = "restitution acts on the velocity of the centre of mass: the contact point has to separate at e times its own approach speed"
 AT_START = "the inertia is rotated by the orientation at the start: in the world frame it is R I Rᵀ with the R of the impact"
 NO_TURN = "the impulse does not turn the body: I⁻¹ (r × j) is not added to the angular velocity, or friction against rolling undoes it"
 POINT_MASS = "the impulse is that of a point mass: K = 1/M - r* I⁻¹ r* lacks its second term"
@@ -192,7 +193,8 @@ def _impulses(contact: Contact, response: Array) -> Iterator[tuple[str, Array]]:
     rebound, speed = -e * u_n, -u_n
     limit = friction * (1.0 + e) * speed / slip if slip > 0.0 and friction > 0.0 else 0.0
     share = min(limit, 1.0)
-    upward = ((BY_SLIP, rebound), (IN_NORMAL, e * speed**2), (IN_NORMAL, (1.0 + e) * speed**2 - speed), (INTO_FLOOR, -rebound))
+    squared = ((IN_NORMAL, e * speed**2), (IN_NORMAL, (1.0 + e) * speed**2 - speed))
+    upward = ((BY_SLIP, rebound), *squared, (INTO_FLOOR, -rebound), (OF_CENTRE, -e * float(contact.velocities[1])))
     for message, velocity in upward:
         yield message, by_slip(velocity, share)
         if np.isfinite(friction):

@@ -9,7 +9,7 @@ from support.transcription import UP, quaternion_product, rotation_matrix
 
 from dropspin.comparisons.conformance import motions
 from dropspin.comparisons.conformance.checks import run_check
-from dropspin.comparisons.conformance.impacts import AT_START, BY_SLIP, IN_NORMAL, NO_TURN, OF_NOTE, POINT_MASS
+from dropspin.comparisons.conformance.impacts import AT_START, BY_SLIP, IN_NORMAL, NO_TURN, OF_CENTRE, OF_NOTE, POINT_MASS
 from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.running.arguments import EngineEntry
@@ -96,6 +96,11 @@ MISTAKES = {
     "inertia rotated back": ("rotated in the wrong direction", "impacts", {"inverse_inertia": lambda self, R: R.T @ inv(self.inertia) @ R}),
     "inverse not taken": (NOT_INVERTED, "corner", {"inverse_inertia": lambda self, R: R @ self.inertia @ R.T}),
     "inverse not taken in K": (NOT_INVERTED, "impacts", {"inverse_in_k": lambda self, R: R @ self.inertia @ R.T}),
+    "restitution of the centre": (
+        re.escape(OF_CENTRE),
+        "spinning corner",
+        {"wanted_normal": lambda self, u: -u - self.restitution * (self.v @ UP)},
+    ),
     "no turn": (re.escape(NO_TURN), "impacts", {"inverse_inertia": lambda self, R: np.zeros((3, 3)), "inverse_in_k": turning}),
     "a ball does not turn": (
         re.escape(NO_TURN),

@@ -12,7 +12,7 @@ import pytest
 from support.cli import dropspin
 from support.repositories import ENGINES, SCENE_TEST, fill, options
 
-from dropspin import pytest_plugin, scenarios
+from dropspin import pytest_plugin, pytest_runs, scenarios
 
 pytest_plugins = ["pytester"]
 
@@ -130,7 +130,7 @@ def test_documentation(repository):
 def test_only_bounds_are_called_expected(kind, truth, message):
     """An extrapolated value is always inside its interval, also if it fails."""
     row = {"metric": "energy_error", "kind": kind, "truth": truth, "dt": None, "unit": "1", "value": -0.09}
-    assert pytest_plugin._message(row | {"lower": -0.0925, "upper": -0.0868}) == message
+    assert pytest_runs.message_of(row | {"lower": -0.0925, "upper": -0.0868}) == message
 
 
 @pytest.mark.extended

@@ -276,7 +276,8 @@ def _errors_of(scene: Scenario, metric: Metric, series: Sequence[SeriesPoint], p
         np.array([values[part] if values.ndim == len(part) and len(values) > part[0] else math.nan for values in all_steps])
         for all_steps in zip(*(point.average for point in series), strict=True)
     )
-    resolutions = np.maximum(resolutions, noise_of_missed(np.array([point.dt for point in series]), jumps))
+    missed = noise_of_missed(np.array([point.dt for point in series]), jumps)
+    resolutions = np.maximum(resolutions, missed / STANDARD_DEVIATIONS)
     if metric.unit == "rad":
         errors[np.abs(errors) > SATURATION] = math.nan
     if metric.name == "position_error" and scene.starts_above_floor and scene.recording is None:

@@ -152,6 +152,8 @@ def grows_without_limit(dts: Array, errors: Array, noise: Array, large: float) -
 def noise_of_missed(dts: Array, jumps: Array) -> Array:
     """The noise at each time step of an event, such as a missed contact, that one start phase of many met at a coarser step, and none here.
 
+    Of an event at one of n starts, the mean has a standard deviation of 1/n of its effect.
+
     Args:
         dts: Time steps [s], shape (n,).
         jumps: The effect of a single start phase on the mean over all of them, at each time step.

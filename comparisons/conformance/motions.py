@@ -29,7 +29,8 @@ from dropspin.scenarios.truths import LAWS, Law
 Fault = FaultModel | Mistake
 SINGLY: tuple[Fault, ...] = (*(fault for fault in FAULT_MODELS if fault.about != "start"), *SHAPE_FAULTS, *MISTAKES)
 """The start has a check of its own."""
-PAIRS = tuple(first.and_also(second) for first, second in combinations(FAULT_MODELS, 2) if first.about != second.about)
+PARTS = {first.and_also(second): (first, second) for first, second in combinations(FAULT_MODELS, 2) if first.about != second.about}
+PAIRS = tuple(PARTS)
 CONTRADICTIONS = 2
 """Number of probes in which another motion excludes a fault that explains none."""
 
@@ -125,18 +126,19 @@ def explain_motion(probe: Probe, states: Array, motion_of: Callable[[Probe], Arr
     """
     # The exact solution of a box on its corner takes too long for thousands of pairs.
     shapes = {*Engine.shapes, probe.scene.body.shape}
-    alone: list[Array] = []  # a pair is no explanation if one of its faults changes nothing here, and the other one is excluded
+    alone: set[Fault] = set()  # a pair is no explanation if one of its faults gives this motion by itself, and is excluded
     for faults in (SINGLY, PAIRS) if _has_pairs(probe) else (SINGLY,):
         motions = _motions(probe, faults)
         off = dict(zip(motions, np.round(probe.off(states, np.array([*motions.values()])), 3), strict=True))
         candidates = sorted((fault for fault in motions if off[fault] <= 1.0), key=off.__getitem__)
-        candidates = [fault for fault in candidates if not any(probe.off(motions[fault], one) <= 1.0 for one in alone)]
+        barred: set[Fault] = {pair for pair, parts in PARTS.items() if not alone.isdisjoint(parts)}
+        candidates = [fault for fault in candidates if fault not in barred]
         known = PROBES if faults is SINGLY else list(filter(_has_pairs, PROBES))
         others = [other for other in known if other != probe and other.scene.body.shape in shapes]
-        best = _best(candidates, others, motion_of, is_pair=faults is PAIRS)
+        best, excluded = _best(candidates, others, motion_of, is_pair=faults is PAIRS)
         if best is not None:
             return best
-        alone = [motions[fault] for fault in candidates]
+        alone = excluded
     return None
 
 
@@ -146,14 +148,14 @@ def _has_pairs(probe: Probe) -> bool:
 
 def _best(
     candidates: Iterable[Fault], probes: Iterable[Probe], motion_of: Callable[[Probe], Array | None], *, is_pair: bool
-) -> Fault | None:
-    """The fault that gives the engine's states of the most probes.
+) -> tuple[Fault | None, set[Fault]]:
+    """The fault that gives the engine's states of the most probes, and those that change a probe in which the engine is right.
 
     A fault is left out if it changes a probe in which the engine is right, or if it gives other states than the engine's in several and
     explains no other probe; of the thousands of pairs, some end like the engine by chance: one has to explain more probes than it does not.
     """
     explained = dict.fromkeys(candidates, 0)
-    contradicted = dict.fromkeys(explained, 0)
+    contradicted, excluded = dict.fromkeys(explained, 0), set[Fault]()
     for probe in probes:
         exact, motions = probe.exact, _motions(probe, tuple(explained))
         changed = {fault: states for fault, states in motions.items() if probe.off(states, exact) > 1.0}
@@ -165,13 +167,14 @@ def _best(
                 explained[fault] += 1
             elif probe.off(of_engine, exact) <= 1.0:
                 del explained[fault]
+                excluded.add(fault)
             else:
                 contradicted[fault] += 1
     if is_pair:
         likely = [fault for fault, number in explained.items() if number > contradicted[fault]]
     else:
         likely = [fault for fault, number in explained.items() if number > 0 or contradicted[fault] < CONTRADICTIONS]
-    return max(likely, key=explained.__getitem__, default=None)
+    return max(likely, key=explained.__getitem__, default=None), excluded
 
 
 @cache

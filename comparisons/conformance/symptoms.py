@@ -21,6 +21,8 @@ QUANTITIES = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("ang
 """Those of `differences`."""
 CLEAR = 1e-3
 """Share of a speed, and ratio of a friction impulse, from which a difference is stated."""
+NONE = 0.05
+"""Size of a negative restitution that counts as none: a contact has then nearly ended."""
 SLEEPY = 0.1
 """Share of the largest speed of a fall below which an engine may put a body to sleep."""
 ALONG = 0.1
@@ -138,6 +140,7 @@ def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
         speed, gained = abs(float(case.motion.velocity[before, 1])), case.dt * float(np.linalg.norm(scene.acceleration))
         if abs(wrong - right) * speed > CLEAR * speed + (1.0 + scene.floor.restitution) * gained:
             restitution = scene.floor.restitution + wrong - right
+            restitution = 0.0 if -NONE < restitution < 0.0 else restitution
             later = case.motion.velocity[after : after + 2]
             lasts = len(later) > 1 and length(later[1] - later[0] - case.dt * scene.acceleration) > CLEAR * speed
             if restitution < 0.0 and lasts:

@@ -122,12 +122,15 @@ def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     rounded = rounding(scene, metric.unit, claim.precision, np.array([point.steps for point in series], dtype=float))
 
     def judged(part: Part) -> Judged:
-        errors, resolutions = _errors_of(scene, metric, series, part)
+        errors, resolutions, missed = _errors_of(scene, metric, series, part)
         chance = 0.0
         if metric.name in JUMPING:  # the step changes it by chance, as far as it has changed it at all
             chance = float(np.nanmax(errors, initial=-math.inf) - np.nanmin(errors, initial=math.inf))
         noise = STANDARD_DEVIATIONS * np.maximum(resolutions, chance)
         budget = error_budget(dts, errors, claim.order, noise, rounded, signed=metric.signed, negligible=floor)
+        if (missed > noise).any() and not (budget.cause == "model" and _goes_on(budget, errors, missed, at)):
+            noise = np.maximum(noise, missed)
+            budget = error_budget(dts, errors, claim.order, noise, rounded, signed=metric.signed, negligible=floor)
         if budget.cause == "unresolved" and grows_without_limit(dts, errors, noise, LARGE * scale(scene, metric.unit)):
             budget = growing(budget, float(errors[at]), float(noise[at]))
         return budget, errors
@@ -270,20 +273,28 @@ def _with_other_sign(part: Part, parts: Array) -> list[Part]:
     return [part, *((part[0], side) for side in range(parts.shape[1]) if side != part[1])] if parts.ndim > 1 else [part]
 
 
-def _errors_of(scene: Scenario, metric: Metric, series: Sequence[SeriesPoint], part: Part) -> tuple[Array, Array]:
-    """Errors and their resolution in one flight, with one sign; NaN where a time step does not resolve it, or the error saturates."""
+def _goes_on(budget: ErrorBudget, errors: Array, missed: Array, at: int) -> bool:
+    """Whether events that finer steps may have missed can only add to a model error: they have its sign, by the errors where they occur."""
+    added = errors[missed < missed[at]] - errors[at]
+    return bool(np.all(added[np.isfinite(added)] * budget.asymptotic_error > 0.0))
+
+
+def _errors_of(scene: Scenario, metric: Metric, series: Sequence[SeriesPoint], part: Part) -> tuple[Array, Array, Array]:
+    """Errors, their resolution, and the noise of events that the step may have missed, in one flight, with one sign.
+
+    NaN where a time step does not resolve the flight, or the error saturates.
+    """
     errors, resolutions, jumps = (
         np.array([values[part] if values.ndim == len(part) and len(values) > part[0] else math.nan for values in all_steps])
         for all_steps in zip(*(point.average for point in series), strict=True)
     )
     missed = noise_of_missed(np.array([point.dt for point in series]), jumps)
-    resolutions = np.maximum(resolutions, missed / STANDARD_DEVIATIONS)
     if metric.unit == "rad":
         errors[np.abs(errors) > SATURATION] = math.nan
     if metric.name == "position_error" and scene.starts_above_floor and scene.recording is None:
         is_sideways = np.array(list(map(_is_sideways, series)))
         errors[(np.abs(errors) > DESYNCHRONISED * scene.clearance) & ~is_sideways] = math.nan
-    return errors, resolutions
+    return errors, resolutions, missed
 
 
 def _is_sideways(point: SeriesPoint) -> bool:

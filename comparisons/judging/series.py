@@ -29,7 +29,7 @@ DIVERGING = 0.1
 """Least power of 1/dt, from one time step to the next, with which an error grows so that it may approach no value."""
 TWO_DIGITS = 0.01
 """Logarithms of errors that differ by less than this are equal, because errors near rounding have few digits."""
-HIGHEST_POWER = 4
+HIGHEST_POWER = 7
 """The effect of a start phase that falls faster than this power of the time step is that of an event which no start met at finer steps."""
 
 

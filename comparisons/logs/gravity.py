@@ -101,14 +101,13 @@ def of_scale(flights: Flights, drag: Regression) -> Iterator[Finding]:
     is_tilted = level > math.hypot(wide[0], wide[2])
     whole = math.hypot(fall, level) if is_tilted else -fall
     high += whole + fall
-    gravity = min(-fall, whole, key=lambda size: abs(size - header.gravity))
-    ratio = gravity / header.gravity
-    if not low <= header.gravity <= high and abs(ratio - 1.0) > LEAST_SCALE:
+    ratio = whole / header.gravity
+    if not low <= header.gravity <= high and min(abs(ratio - 1.0), abs(fall / header.gravity + 1.0)) > LEAST_SCALE:
         at_rest, spread, _, _ = rests(flights.log).scale()
         by_length, by_rate = (abs(at_rest - expected) < 4.0 * spread + 0.004 for expected in (ratio, 1.0))
-        single = (_length_cause(header, ratio), _rate_cause(flights.log, ratio), _local(gravity))
+        single = (_length_cause(header, ratio), _rate_cause(flights.log, ratio), _local(whole))
         causes = shown(*zip(single, (by_length, by_rate, by_rate), strict=True))
-        yield Finding("scale", gravity, header.gravity, causes=causes, rests=at_rest)
+        yield Finding("scale", whole, header.gravity, causes=causes, rests=at_rest)
     if is_tilted:
         yield Finding("tilt", math.atan2(level, -fall), 0.0, causes=(Cause("axes"), Cause("push")))
 

@@ -42,6 +42,8 @@ ROUNDS = 3
 """Rounds in which the parameters and the discrepancy are found, each by the other."""
 DISCREPANCIES = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 121)])
 """Discrepancies to choose from [m]."""
+UNCHANGED = 1e-6
+"""Change of a quaternion in a toss that is none."""
 TIE = 1e-3
 """Of sums of losses: parameters with which a sum is larger by no more are as good."""
 
@@ -49,7 +51,7 @@ TIE = 1e-3
 class Problem(NamedTuple):
     """What all engines are given: the tosses, and those from starts that differ by a standard deviation in each of 12 directions.
 
-    Rotations are left out if no orientation changes: whoever records positions alone writes the same quaternion in all rows.
+    Rotations are left out if the orientation of a toss never changes: whoever records positions alone writes one quaternion in all rows.
     """
 
     measured: Array
@@ -88,7 +90,7 @@ def problem_of(flights: Flights, frames: int, steps: int) -> Problem:
     launched = launches(header, starts, np.array([start.state for start in starts]), dt, frames)
     perturbed = launches(header, [start for start in starts for _ in range(12)], moved, dt, frames)
     noises = [flights.moving.noise.white]
-    if any(np.ptp(start.toss.orientation, axis=0).any() for start in starts):
+    if all(np.ptp(start.toss.orientation, axis=0).max() > UNCHANGED for start in starts):
         noises.append(header.body.size * flights.turning.noise.white)
     return Problem(recorded(starts, frames)[:, 1:], launched, perturbed, np.tile(np.repeat(noises, 3) ** 2, frames))
 

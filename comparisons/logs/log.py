@@ -124,18 +124,14 @@ class Log:
         tosses: The tosses, in the order of the file.
         origin: The argument of `load_log`.
         irregularities: Irregularities of the file, such as repeated rows, missing frames, uneven times or another frame rate.
+        has_times: Whether the file has times; else they follow from the rate of the header.
     """
 
     header: Header
     tosses: tuple[Toss, ...]
     origin: str
     irregularities: tuple[Finding, ...]
-
-    @property
-    def has_times(self) -> bool:
-        """Whether times were recorded; else they follow from the rate of the header."""
-        first = self.tosses[0].t
-        return self.header.rate is None or not np.allclose(first * self.header.rate, np.arange(len(first)), rtol=1e-9)
+    has_times: bool = False
 
 
 def log_names() -> list[str]:
@@ -177,7 +173,8 @@ def load_log(recording: str | Path) -> Log:
     parts = {str(labels[number]): np.flatnonzero(index == number) for number in np.argsort(first)}
     tosses = [_toss(where, header, name, columns, rows) for name, rows in parts.items()]
     poses = np.column_stack([columns[column] for column in (*POSITION, *ORIENTATION)])
-    return Log(header, tuple(tosses), given, tuple(_irregularities(header, tosses, [poses[rows] for rows in parts.values()])))
+    irregularities = _irregularities(header, tosses, [poses[rows] for rows in parts.values()])
+    return Log(header, tuple(tosses), given, tuple(irregularities), "t" in columns)
 
 
 def _toss(where: str, header: Header, name: str, columns: dict[str, Array], rows: NDArray[np.intp]) -> Toss:
@@ -222,7 +219,11 @@ def _irregularities(header: Header, tosses: list[Toss], poses: list[Array]) -> I
         yield from _repeated(toss.name, rows)
         yield from _uneven(toss)
     rate, error = frame_rate(tosses)
-    if header.rate is not None and abs(rate / header.rate - 1.0) > OTHER_RATE + error:
+    if header.rate is None or abs(rate / header.rate - 1.0) <= OTHER_RATE + error:
+        return
+    # Times of two digits may have steps of one and of two units, of which the longer ones look like missing frames.
+    fits = all(is_uneven(np.diff(toss.t)) and (np.diff(np.rint(header.rate * toss.t)) == 1.0).all() for toss in tosses)
+    if not fits:
         yield Finding("rate", rate, header.rate, causes=(Cause("times"), Cause("rate of the header", keys={"rate": rate})))
 
 

@@ -27,7 +27,7 @@ FEWEST_RESTS = 6
 OTHER_FACE = 0.05
 """Difference of the expected heights, as a share of the size of the body, from which on it rests on several faces."""
 UNEXPLAINED = 0.3
-"""Share of a large scatter of heights from which on a wrong scale of the lengths does not explain it."""
+"""Share of a large range of heights from which on a wrong scale of the lengths does not explain it."""
 LEVEL = 0.04
 """Heights of vertices, as a share of the size of the body, that count as equal: a turn of 2 degrees."""
 
@@ -81,7 +81,11 @@ class Rests(NamedTuple):
         """
         slope, _ = self.stretch(size)
         left = self.heights if math.isnan(slope) else self.heights - slope * self.expected
-        return self.scatter > size and float(np.std(left)) > UNEXPLAINED * self.scatter
+        if len(left) < FEWEST_RESTS:
+            return False
+        # Half of them, so that a few that rest on something else do not count.
+        spread, unexplained = (float(np.ptp(np.quantile(values, [0.25, 0.75]))) for values in (self.heights - self.expected, left))
+        return spread > size and unexplained > UNEXPLAINED * spread
 
     def above(self) -> tuple[float, float]:
         """The median height of the lowest points above the floor [m], and its standard error; NaN with fewer than `FEWEST_RESTS`."""

@@ -383,6 +383,12 @@ def test_rounded_times_have_the_rate_of_their_mean_step(tmp_path, rate, digits):
     assert found.value == pytest.approx(rate, rel=0.02)
 
 
+def test_times_with_steps_of_one_and_of_two_units_fit_the_rate_of_the_header(tmp_path):
+    """At 75 frames per second, times in hundredths of a second; a step of two looks like a missing frame."""
+    log = load_log(written(tmp_path, POSE | {"t": np.round(np.arange(FRAMES) / 75.0, 2)}, {"rate": 75.0}))
+    assert "rate" not in {finding.kind for finding in log.irregularities}
+
+
 def test_repeated_rows_missing_frames_uneven_times_and_another_rate_are_facts(tmp_path):
     rows = np.delete(np.arange(FRAMES), [20, 21, 30])
     held = np.where((rows >= 10) & (rows < 13), 10, rows)

@@ -130,3 +130,12 @@ def test_bodies_at_rest_are_recognised_beside_noise_and_bodies_that_move_are_not
 def _noisy(orientations: Array, noise: float, random: np.random.Generator) -> Array:
     turned = orientations + noise / 2.0 * random.normal(size=orientations.shape)
     return turned / np.linalg.norm(turned, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize(("elsewhere", "apart"), [(2, False), (10, True)])
+def test_a_few_bodies_on_something_else_do_not_hide_the_floor_of_the_others(elsewhere, apart):
+    """Of 20 bodies that rest at 0.5 m, some lie up to a metre lower."""
+    expected = np.tile([0.02, 0.03, 0.05, 0.02], 5)
+    lower = np.where(np.arange(20) < elsewhere, np.linspace(0.4, 1.0, 20), 0.0)
+    found = Rests(np.tile([0.0, 0.0, 0.0, 1.0], (20, 1)), 0.5 + expected - lower, expected)
+    assert found.are_apart(0.1) is apart

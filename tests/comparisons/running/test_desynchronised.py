@@ -63,14 +63,19 @@ def test_flight_that_is_the_same_at_all_time_steps_is_no_model_error():
     assert rows.loc["desync_rate", "lower"] <= 0.0 < rows.loc["desync_rate", "value"]
 
 
+def first_impact(scene):
+    """The time of the first impact of a ball [s]."""
+    start, gravity = scene.initial_state, -scene.acceleration[1]
+    return (start[8] + math.sqrt(start[8] ** 2 + 2.0 * gravity * (start[1] - scene.body.radius))) / gravity
+
+
 class Missing(made.Exact):
     """Loses .2 of its restitution if the first impact is in the first fiftieth of a time step: at one start phase of 32, or at none."""
 
     name = "missing"
 
     def prepare(self, scene, dt):
-        start, gravity = scene.initial_state, -scene.acceleration[1]
-        impact = (start[8] + math.sqrt(start[8] ** 2 + 2.0 * gravity * (start[1] - scene.body.radius))) / gravity
+        start, impact = scene.initial_state, first_impact(scene)
         missed = 0.2 if impact / dt % 1.0 < 0.02 else 0.0
         return made.ExactSimulation(changed(scene, floor={"restitution": scene.floor.restitution - missed}).starting_at(start), dt)
 
@@ -84,6 +89,43 @@ def test_event_that_a_finer_step_happens_not_to_meet_does_not_vanish():
     found = rows.loc["asymptotic_error"]
     assert (found["cause"], found["verdict"]) == ("unresolved", "measured")
     assert found["lower"] < rows.loc["truth", "value"].mean() / 2
+
+
+class MissingAtFour(made.Exact):
+    """Restitution is too low by .001 at every time step, and by .2 more at 4 ms, at one start phase of 32."""
+
+    name = "missing-at-four"
+
+    def prepare(self, scene, dt):
+        start, impact = scene.initial_state, first_impact(scene)
+        missed = 0.2 if dt > 3e-3 and impact / dt % 1.0 < 0.03 else 0.0
+        return made.ExactSimulation(changed(scene, floor={"restitution": scene.floor.restitution - 1e-3 - missed}).starting_at(start), dt)
+
+
+@pytest.mark.usefixtures("all_start_phases")
+def test_event_at_a_coarse_step_does_not_hide_an_error_that_all_starts_have():
+    """What finer steps may have missed could only add to it."""
+    found = ds.run([changed(BALL, expect=())], [MissingAtFour()]).asymptotic_errors("model").set_index("metric")
+    assert found.loc["energy_error", "verdict"] == "failed"
+    assert found.loc["energy_error", "lower"] <= -9.99e-4 <= found.loc["energy_error", "upper"]
+
+
+class OfHighOrder(made.Exact):
+    """Restitution is too low by .05 (dt / 4 ms)⁶, times 1/2 to 3/2, by the phase of the impact within a step."""
+
+    name = "of-high-order"
+
+    def prepare(self, scene, dt):
+        start, impact = scene.initial_state, first_impact(scene)
+        error = 0.05 * (dt / 4e-3) ** 6 * (0.5 + impact / dt % 1.0)
+        return made.ExactSimulation(changed(scene, floor={"restitution": scene.floor.restitution - error}).starting_at(start), dt)
+
+
+@pytest.mark.usefixtures("all_start_phases")
+def test_effect_of_a_start_phase_that_falls_with_a_high_order_is_no_event():
+    rows = ds.run([changed(BALL, expect=())], [OfHighOrder()]).table
+    found = rows[(rows["metric"] == "energy_error") & (rows["kind"] == "asymptotic_error")].iloc[0]
+    assert (found["cause"], found["verdict"]) == ("discretisation", "passed")
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,10 @@ import numpy as np
 from dropspin.comparisons.diagnosis.geometries import VOLUMES
 from dropspin.comparisons.diagnosis.loose_body import Changes
 from dropspin.comparisons.diagnosis.mujoco_contacts import contact_of, overrides, plain, with_friction
-from dropspin.comparisons.diagnosis.mujoco_file import BOX, GEOM, PLANE, MuJoCoFile
+from dropspin.comparisons.diagnosis.mujoco_file import BOX, GEOM, PLANE, MuJoCoFile, one_line
 from dropspin.comparisons.diagnosis.mujoco_options import ELLIPTIC, set_options
 from dropspin.comparisons.diagnosis.mujoco_shapes import MODELLED, kind_of, mesh_of, quaternion, shape_of
+from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM
 from dropspin.comparisons.running.driving import Breakdown
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
@@ -113,7 +114,10 @@ class MuJoCoAlone:
             self._add_bodies(spec)
             if floor:
                 self._add_surface(spec)
-            self._models[key] = spec.compile()
+            try:
+                self._models[key] = spec.compile()
+            except ValueError as error:  # as of a flag that needs the integrator of the file
+                raise Diverged(f"MuJoCo refuses these options: {one_line(error)}") from None
         return self._models[key]
 
     def _add_bodies(self, spec: Any) -> None:

@@ -146,7 +146,10 @@ class MuJoCoFile:
         """Whether the whole model runs for a tenth of a second with other options."""
         spec = self.spec.copy()
         set_options(spec.option, self.model.opt, dt, changes)
-        model = spec.compile()
+        try:
+            model = spec.compile()
+        except ValueError:  # these options need others
+            return False
         data = mujoco.MjData(model)
         with quiet():
             mujoco.mj_step(model, data, math.ceil(0.1 / dt))

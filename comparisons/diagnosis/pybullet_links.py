@@ -186,7 +186,10 @@ def _shape(file: UrdfFile, kind: int, sizes: Sequence[float], element: Element) 
 
 @cache
 def _hull(file: UrdfFile, element: Element) -> Shape | None:
-    """The convex hull that PyBullet makes of a mesh or a cylinder, for which a body that has it alone is loaded; None if it is flat."""
+    """The convex hull that PyBullet makes of a mesh or a cylinder, for which a body that has it alone is loaded; None if it is flat.
+
+    Of an OBJ file of several objects it makes one for each; the hull of all bounds them then, but is no solid.
+    """
     bullet, geometry = server(), file.written(next(element.every("geometry")))
     number = load(file.given, f'<robot name="hull"><link name="hull"><collision>{geometry}</collision></link></robot>')
     points = np.array(bullet.getMeshData(number, -1)[1])
@@ -198,4 +201,5 @@ def _hull(file: UrdfFile, element: Element) -> Shape | None:
     outward = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
     inside_out = np.sum(outward * hull.equations[:, :3], axis=1) < 0.0
     faces[inside_out] = faces[inside_out, ::-1]
-    return mesh_shape(points, faces)
+    has_parts = any(file.number_of_objects(mesh) > 1 for mesh in element.every("mesh"))
+    return solid("mesh", points=points, faces=faces, inertia="surface") if has_parts else mesh_shape(points, faces)

@@ -94,6 +94,16 @@ class UrdfFile:
         places = [Path.cwd(), *self.path.resolve().parents]
         return next((str(place / name) for place in places if (place / name).is_file()), name)
 
+    def number_of_objects(self, mesh: Element) -> int:
+        """How many objects or groups of an OBJ file have faces; 1 of another file, or of one that is not found."""
+        path, found, is_new = Path(self._mesh(mesh.attributes.get("filename", ""))), 0, True
+        if path.suffix.lower() != ".obj" or not path.is_file():
+            return 1
+        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+            found += is_new and line.startswith("f ")
+            is_new = line.startswith(("o ", "g ")) or (is_new and not line.startswith("f "))
+        return found
+
 
 def package_remedy(source: Element) -> str:
     """The end of a sentence on a mesh that is not found: what to do with the first path in a package; empty if there is none."""

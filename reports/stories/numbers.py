@@ -14,6 +14,8 @@ MOST_NAMED = 3
 """Largest number of scenes, metrics or engines that a sentence names; if there are more, it gives their number."""
 SEVERAL = 1.02
 """Sum of shares above which the shares belong to alternative explanations."""
+EACH = 0.9
+"""Least share of each of these."""
 Row = Mapping[Hashable, Any]
 """A row of the table of a run, by column."""
 Item = TypeVar("Item")
@@ -117,7 +119,7 @@ def explained_by(shares: Mapping[str, float], error: str) -> str:
     names, sizes = [name.replace(", ", " and ") for name in shares], [f"{rounded(100.0 * share, 3)} %" for share in shares.values()]
     are_together = any(", " in name for name in shares)
     explain = "explain" if are_together else "explains"
-    if len(shares) > 1 and sum(shares.values()) > SEVERAL:
+    if len(shares) > 1 and sum(shares.values()) > SEVERAL and min(shares.values()) >= EACH:
         return f"either {', or '.join(names)} {explain} {sizes[0]} {error}"
     if are_together:
         return f"{names[0]} together explain {sizes[0]} {error}; neither alone explains 90 %"

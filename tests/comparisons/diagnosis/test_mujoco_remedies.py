@@ -6,7 +6,7 @@ import pytest
 from support.model_files import FREE, body_of, findings_of
 
 from dropspin.comparisons.diagnosis.answers import TIPS, Answer, Finding
-from dropspin.comparisons.diagnosis.flight import spin
+from dropspin.comparisons.diagnosis.flight import spin, tumble
 from dropspin.comparisons.diagnosis.landing import impact, rest
 from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
 from dropspin.comparisons.diagnosis.remedies import answers_to
@@ -38,6 +38,15 @@ def test_remedy_changes_the_option_that_overrides_all_contacts(tmp_path):
     [(_, of_rest)] = findings_of(body, rest)
     assert of_rest.remedies[0].text.startswith('<option o_solref=".1 1" o_margin="0"')
     assert of_rest.remedies[0].value == pytest.approx(1.226e-3, rel=0.01)
+
+
+def test_remedy_that_mujoco_refuses_is_not_given(tmp_path):
+    """The flag `ipc` requires the integrator of the file, so that no other one is a remedy of the tumble's energy."""
+    box = FREE.format('<geom type="box" size=".1 .06 .03" mass="1"/>')
+    body = body_of(tmp_path, box, 'integrator="discrete"', head='<option><flag ipc="enable"/></option>')
+    found = [found for _, found in findings_of(body, tumble)]
+    assert [one.kind for one in found] == ["time step"]
+    assert not [remedy.text for remedy in found[0].remedies if "integrator" in remedy.text.replace('integrator="discrete"', "")]
 
 
 def test_high_impratio_is_no_cause_of_what_pyramidal_cones_do(tmp_path):

@@ -287,3 +287,16 @@ def test_a_contact_with_stiffness_and_damping_has_no_exact_rebound(tmp_path):
     soft = "<contact><stiffness value='1000'/><damping value='10'/></contact>"
     assert body(tmp_path, link(BALL, extra=soft)).restitution is None
     assert body(tmp_path, link(BALL)).restitution == 0.0
+
+
+@pytest.mark.parametrize(("objects", "is_solid"), [(1, True), (2, False)])
+def test_hull_around_several_objects_of_a_mesh_is_no_solid(tmp_path, objects, is_solid):
+    """PyBullet makes a hull of each object, so that the inertia of the hull of all is no remedy."""
+    apart = (
+        TETRAHEDRON.replace("v 0 0 0", "v 3 0 0").replace("v 1 0 0", "v 4 0 0").replace("v 0 1 0", "v 3 1 0").replace("v 0 0 1", "v 3 0 1")
+    )
+    second = "o second\n" + apart.replace("f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4", "f 5 7 6\nf 5 6 8\nf 5 8 7\nf 6 7 8")
+    (tmp_path / "mesh.obj").write_text("o first\n" + TETRAHEDRON + second * (objects - 1), encoding="utf-8")
+    found = body(tmp_path, link('<mesh filename="mesh.obj"/>'))
+    assert np.ptp(found.points[:, 0]) == pytest.approx(4.0 if objects == 2 else 1.0, abs=1e-6)
+    assert (found.solid is not None) is is_solid

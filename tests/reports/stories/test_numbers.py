@@ -93,6 +93,7 @@ def test_sentences_of_pages_name_engines_but_commands_have_their_labels(text, sh
         ({"a, b": 1.04}, "a and b together explain 104 % of it; neither alone explains 90 %"),
         ({"a": 1.0, "b": 1.0}, "either a, or b explains 100 % of it"),
         ({"a": 0.7, "b": 0.3}, "a explains 70 % of it, and b 30 %"),
+        ({"a": 0.897, "b": 0.148}, "a explains 89.7 % of it, and b 14.8 %"),
     ],
 )
 def test_alternatives_are_named_where_there_are_several(shares, text):

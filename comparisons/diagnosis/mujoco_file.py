@@ -238,12 +238,23 @@ class MuJoCoFile:
         return self.gravity / size if size else np.array([0.0, 0.0, -1.0])
 
     def missed(self, own: Sequence[int]) -> str:
-        """A plane of the world that some geometries fall through, and why; empty if there is none, or something else to land on."""
-        still, names = self._still(own), list(self.names(GEOM))
-        planes = [geom for geom in still if self.model.geom_type[geom] == PLANE]
-        if not planes or (self.has_contacts and any(self._collide(own, geom) for geom in still)):
+        """A plane or a box of the world that some geometries fall through, and why; empty if there is none.
+
+        If they land on something, it is what they would land on before. What collides with nothing at all is only seen, but for a plane
+        that is all that there is.
+        """
+        kinds, names = self.model.geom_type, list(self.names(GEOM))
+        held = {geom for geom in self._still(own) if self.has_contacts and self._collide(own, geom)}
+        above = {geom: self.height_above(geom, own) if own else math.inf for geom in self._still(own) if kinds[geom] in SURFACES}
+        lowest = min((above.get(geom, -math.inf) for geom in held), default=math.inf)
+        seen = (self.model.geom_contype | self.model.geom_conaffinity) == 0
+        through = [geom for geom, height in above.items() if geom not in held and not seen[geom] and height < lowest]
+        through = sorted(through, key=above.__getitem__) or [geom for geom in above if kinds[geom] == PLANE and not held]
+        if not through:
             return ""
-        bodies, below = ({mujoco.mj_id2name(self.model, BODY, self.model.geom_bodyid[geom]) for geom in some} for some in (own, planes))
+        bodies, below = (
+            {mujoco.mj_id2name(self.model, BODY, self.model.geom_bodyid[geom]) for geom in some} for some in (own, through[:1])
+        )
         pairs = [(one, {one.attributes.get("body1"), one.attributes.get("body2")}) for one in self.source.every("exclude")]
         excluded = [f"{one.words} leaves out their contacts" for one, pair in pairs if pair & bodies and pair & below]
         flags = (option_setting(self.source, "flag", name, "enable") for name in ("contact", "constraint"))
@@ -251,7 +262,7 @@ class MuJoCoFile:
         why = [*disabled, *excluded, "no geometry of the body collides with it"][0]
         discards = option_setting(self.source, "compiler", "discardvisual", "false")
         without = "the body has no geometry" + f", by {discards}" * ('"true"' in discards.text)
-        return f"{names[planes[0]]} does not hold it, because {why if own else without}"
+        return f"{names[through[0]]} does not hold it, because {why if own else without}"
 
     def left_out(self, own: Sequence[int]) -> str:
         """What some geometries collide with that they cannot land on, if no plane and no box of the world is below; else empty."""

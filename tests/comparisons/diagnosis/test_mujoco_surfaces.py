@@ -119,3 +119,24 @@ def test_beam_of_a_mesh_rests_on_a_table_without_jitter(tmp_path):
     depth, drift = rest(beam, ladder(beam)[:1])[:2]
     assert depth.measured == pytest.approx(beam.rest_depth, rel=1e-3)
     assert drift.measured < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("top", "rest", "why"),
+    [
+        ('contype="2" conaffinity="2"', "", "no geometry of the body collides with it"),
+        ("", '<contact><exclude body1="table" body2="mug"/></contact>', "leaves out their contacts"),
+        ('contype="0" conaffinity="0"', "", ""),  # is only seen
+        ("", "", ""),
+    ],
+)
+@pytest.mark.parametrize("floor", ['<geom type="plane" size="2 2 .1"/>', ""])
+def test_table_that_a_body_falls_through_is_named_with_the_reason(tmp_path, floor, top, rest, why):
+    """The mug is a centimetre above the table, and half a metre above the floor."""
+    mug = '<body name="mug" pos="0 0 .58"><freejoint/><geom type="cylinder" size=".04 .05" mass=".3"/></body>'
+    table = f'<body name="table"><geom name="top" type="box" size=".5 .5 .02" pos="0 0 .5" {top}/></body>'
+    path = tmp_path / "model.xml"
+    path.write_text(f"<mujoco><worldbody>{floor}{table}{mug}</worldbody>{rest}</mujoco>", encoding="utf-8")
+    missed = MuJoCoModel(path, "model.xml").body("mug", None).missed
+    assert missed.startswith("top does not hold it, because") is bool(why)
+    assert why in missed

@@ -3,7 +3,7 @@
 An error that vanishes as dt → 0 is a discretisation error; one that does not is a model error. The asymptotic error has a 95 %
 interval; docs/coverage.md counts how often the interval contains the true value. A cause is stated if its opposite is improbable:
 
-    model            it is improbable that the asymptotic error is 0 or has the other sign, and the interval excludes 0
+    model            it is improbable that the asymptotic error is negligible or has the other sign, and the interval excludes 0
     discretisation   it is improbable that the asymptotic error is larger than allowed, likely that it is at most half of that, and very
                      improbable that it is larger than half of the error at the coarsest of the three finest time steps. The allowed size
                      is the error at the finest time step, or 1/64 of that at the coarsest, but more than the noise
@@ -259,8 +259,8 @@ def _attributed(
     median, lower, upper = posterior.interval(judged_together)
     if not posterior.has_sign:  # one part that is smaller than another does not show
         upper = max(upper, finest)
-    if (lower > 0.0 or upper < 0.0) and max(above, below) > 1.0 - MODEL_RISK / judged_together:
-        # The interval of a model error begins beyond the floor.
+    cut = floor if posterior.has_sign else 0.0  # the interval of a model error begins beyond the floor; what is cut off is negligible
+    if (lower > -cut or upper < cut) and max(above, below) > 1.0 - MODEL_RISK / judged_together:
         lower, upper = (lower, min(upper, -floor)) if posterior.has_sign and below > above else (max(lower, floor), upper)
         return "model", (median, lower, upper)
     lower, upper = min(lower, 0.0), max(upper, 0.0)

@@ -218,8 +218,10 @@ def _irregularities(header: Header, tosses: list[Toss], poses: list[Array]) -> I
     for toss, rows in zip(tosses, poses, strict=True):
         yield from _repeated(toss.name, rows)
         yield from _uneven(toss)
+    if header.rate is None:
+        return
     rate, error = frame_rate(tosses)
-    if header.rate is None or abs(rate / header.rate - 1.0) <= OTHER_RATE + error:
+    if abs(rate / header.rate - 1.0) <= OTHER_RATE + error:
         return
     # Times of two digits may have steps of one and of two units, of which the longer ones look like missing frames.
     fits = all(is_uneven(np.diff(toss.t)) and (np.diff(np.rint(header.rate * toss.t)) == 1.0).all() for toss in tosses)

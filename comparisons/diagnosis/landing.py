@@ -23,6 +23,8 @@ STILL = 0.01
 THROUGH = "passes through"
 OF_CONTACT = ("solref", "solimp", "stiffness")
 """Settings of contacts that a file may have, beside restitution and friction."""
+SOFTENS = {"cone": ("cone", "friction"), "diagexact": ("diagexact",)}
+"""Settings that may make contacts softer, each with what it does so together with."""
 
 
 class Impacts(NamedTuple):
@@ -154,11 +156,10 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
 
 
 def _softened(body: LooseBody, depth: float, noteworthy: float) -> tuple[Finding, ...]:
-    """The finding of a depth that exceeds a limit [m] and that another friction cone at least halves; none otherwise."""
-    if "cone" not in body.causes.get("rest", ()) or not depth > noteworthy:
-        return ()
-    harder = body.tried(("cone",), body.dt)
-    return (Finding("setting", ("cone", "friction")),) if _at_rest(harder, body.dt)[0] < 0.5 * depth else ()
+    """The finding of a depth that exceeds a limit [m] and that one of the settings of `SOFTENS` at least halves; none otherwise."""
+    acting = SOFTENS.keys() & body.causes.get("rest", ()) if depth > noteworthy else ()
+    softens = (name for name in sorted(acting) if _at_rest(body.tried((name,), body.dt), body.dt)[0] < 0.5 * depth)
+    return next(((Finding("setting", SOFTENS[name]),) for name in softens), ())
 
 
 def _of_error(body: LooseBody, error: float, finest: float, noteworthy: float) -> tuple[Finding, ...]:
@@ -169,7 +170,7 @@ def _of_error(body: LooseBody, error: float, finest: float, noteworthy: float) -
     if not error > noteworthy:
         return ()
     if finest < 0.6 * error:
-        return (Finding("time step", ("timestep",)),)
+        return (Finding("time step", (*body.causes.get("rest", ()), "timestep")),)
     acting = (*body.unknown, *body.causes.get("rest", ()), *body.in_file(*OF_CONTACT))
     return (Finding("setting", acting) if acting else Finding("model", ("timestep",)),)
 

@@ -17,7 +17,7 @@ from dropspin.comparisons.diagnosis.mujoco_changes import ignored
 from dropspin.comparisons.diagnosis.mujoco_compiled import lowers_margin, mass_properties, sleeps
 from dropspin.comparisons.diagnosis.mujoco_contacts import friction_of, overrides, with_friction
 from dropspin.comparisons.diagnosis.mujoco_file import ADDED, PLANE, MuJoCoFile
-from dropspin.comparisons.diagnosis.mujoco_options import ELLIPTIC, ENUMERATIONS, OF_ALL
+from dropspin.comparisons.diagnosis.mujoco_options import ELLIPTIC, ENUMERATIONS, FLAGS, OF_ALL, is_set
 from dropspin.comparisons.diagnosis.mujoco_shapes import quaternion, shape_of
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.engines.base import Diverged
@@ -53,7 +53,7 @@ REMEDIES: Mapping[str, Changes] = {
     "armature": {"armature": 0.0},
     "gravcomp": {"gravcomp": 0.0},
     "integrator": {"integrator": "RK4"},
-    "eulerdamp": {"eulerdamp": "enable"},
+    **{name: {name: default} for name, (_, _, default) in FLAGS.items()},
     "cone": {"cone": "elliptic"},
     "impratio": {"cone": "elliptic", "impratio": HIGH_IMPRATIO},
     "margin": {"margin": 0.0},
@@ -120,9 +120,11 @@ class MuJoCoBody(LooseBody):
         contact, sleep = self.in_file(*DEFAULT_CONTACT), ("sleep_tolerance",) * sleeps(option)
         softens = ("cone",) * (option.cone != ELLIPTIC and self.friction >= ROUGH)
         ends = [name for name, is_early in ENDS.items() if is_early(getattr(option, name), OPTION[name].default)]
-        of_contact = {"slide": (*ends, *contact), "roll": (*ends, *contact), "impact": (*ends, *softens), "rest": (*ends, *softens)}
+        ends_or_flags = [*ends, *(name for name in ("refsafe", "diagexact") if is_set(option, name))]
+        moved = (*ends_or_flags, *contact, *("margin",) * (self.margin > 0.0))
+        of_contact = {"slide": moved, "roll": moved, **dict.fromkeys(("impact", "rest"), (*ends_or_flags, *softens))}
         self.remedies = {**REMEDIES, **{name: {end: OPTION[end].default for end in ends} for name in ends}}
-        is_explicit = alone.damping.any() and option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP and not option.integrator
+        is_explicit = alone.damping.any() and is_set(option, "eulerdamp") and not option.integrator
         acting = {"cone": option.cone != ELLIPTIC, "eulerdamp": is_explicit, "impratio": option.impratio < HIGH_IMPRATIO}
         idle = {name for name, acts in acting.items() if not acts}
         if "cone" in idle:
@@ -246,7 +248,8 @@ class MuJoCoBody(LooseBody):
         is_central = not (armature and self.offset.any()) and self.lifted < 1.0 and not np.ptp(self._model.body_gravcomp[1:])
         is_still = not self._model.opt.wind.any()  # the air moves no body at rest
         points = self._points() if contact is not None and is_central and is_still else 0
-        if not points or contact is None:
+        is_regular = points == 1 or not is_set(self._model.opt, "diagexact")  # else the others change how hard each point is
+        if not points or contact is None or not is_regular:
             return np.nan
         load = self.gravity * (1.0 - self.lifted) * self.mass / (self.mass + armature) / points
         return contact.depth(load) - contact.settings.margin

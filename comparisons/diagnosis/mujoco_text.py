@@ -14,6 +14,7 @@ from dropspin.comparisons.diagnosis.mujoco_compiled import mass_properties
 from dropspin.comparisons.diagnosis.mujoco_contacts import effect_of, overrides, with_friction
 from dropspin.comparisons.diagnosis.mujoco_elements import body_element, children_of, geom_element, pair_element
 from dropspin.comparisons.diagnosis.mujoco_file import BODY, GEOM
+from dropspin.comparisons.diagnosis.mujoco_options import FLAGS
 from dropspin.comparisons.diagnosis.mujoco_recompiled import NEUTRAL, without
 from dropspin.comparisons.diagnosis.xml_file import Element, Setting, tagged
 from dropspin.comparisons.engines.mujoco_settings import OF_GEOM, OPTION
@@ -92,7 +93,7 @@ class BodyText:
         options = {"timestep": "0.002", "integrator": "Euler"} | {name: spelled(OPTION[name].default) for name in OF_MODEL}
         found = {name: option_setting(root, "option", name, default) for name, default in options.items()}
         found |= {"sleep_tolerance": option_setting(root, "flag", "sleep", "disable")}
-        found |= {"eulerdamp": option_setting(root, "flag", "eulerdamp", "enable")}
+        found |= {name: option_setting(root, "flag", name, default) for name, (_, _, default) in FLAGS.items()}
         of_all = {name: option_setting(root, "option", f"o_{name}", "") for name in overrides(self.model)}
         if body is None:
             return found
@@ -190,7 +191,7 @@ class BodyText:
 
     def _with_options(self, options: Mapping[str, object]) -> list[Setting | str]:
         """The elements with other options, and with another flag."""
-        flags = {name: value for name, value in options.items() if name == "eulerdamp"}
+        flags = {name: value for name, value in options.items() if name in FLAGS}
         written = [element for element in self.file.source.every("flag") if flags.keys() <= element.attributes.keys()]
         found: list[Setting | str] = [written[-1].changed(flags) if written else f"{tagged('flag', flags)}/>"] if flags else []
         if not (options := {name: value for name, value in options.items() if name not in flags}):

@@ -195,9 +195,9 @@ def _remedied(
         return finding
     kind: Kind = "setting" if finding.kind == "model" and () not in found else finding.kind
     unchanged = tuple(name for name in finding.settings if name not in (*body.remedies, "timestep"))
-    settings = finding.settings if finding.shares else (next(iter(found)) or ("timestep",)) + unchanged
-    if finding.is_error:
-        settings = tuple(name for name in finding.settings if name in changed)
+    settings = tuple(name for name in finding.settings if name in changed)
+    if not finding.is_error:
+        settings = finding.settings if finding.shares else settings + unchanged
     removes = finding.is_error and kind == "setting"
     return finding._replace(kind=kind, settings=settings, remedies=tuple(found.values()), removes_error=removes)
 

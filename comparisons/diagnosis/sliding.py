@@ -39,6 +39,8 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     blank, long = Answer("slide", "stopping distance", "m", speed=SLIDE, physical=free), f"more than {LONGEST_SLIDE:g} m: not simulated"
     if free > LONGEST_SLIDE:
         return [replace(blank, detail=long)]
+    if SLIDE / (body.friction * body.gravity) < body.dt:
+        return [replace(blank, detail="within a step: not simulated")]
     if not is_at_rest(body):
         return [replace(blank, direction=way, detail=MOVES) for way in WAYS]
     end = body.settled[-1:]

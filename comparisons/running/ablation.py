@@ -40,7 +40,7 @@ def shares(
     """The settings that explain an error.
 
     Args:
-        error: The error with some settings reverted; NaN if it is undefined.
+        error: The error with some settings reverted; NaN if it is undefined, infinite if no part of it can be stated.
         changed: The names of all settings that were changed.
         change: A change of the error, of which reverting all of them takes most away if they explain it.
         partly: Whether the setting that explains most of the error, and at least half, is named if no one or two explain nine tenths.
@@ -54,7 +54,7 @@ def shares(
     error = cache(error)
     whole, calibrated = error(frozenset()), error(frozenset(changed))
     undone = whole - calibrated
-    if not abs(undone) > 0.0 or undone * change < MOST * change**2:
+    if not 0.0 < abs(undone) < math.inf or undone * change < MOST * change**2:
         return {}
 
     def share(*names: str) -> float:

@@ -26,6 +26,12 @@ FEWEST_FRAMES = 6
 """Of a flight; a parabola in three coordinates leaves half of the numbers of six frames."""
 NEAR = 0.25
 """How far the acceleration of a piece of a fall may be from that of the falls, as a share; farther if the noise needs it."""
+JOINED, FARTHER = 0.5, 2.0
+"""Share of the frames of a piece, and multiple of what is far: so many pieces in succession may be so far off by noise. An impact is in
+nearly as many pieces as one has frames, and a bad frame moves some farther.
+"""
+QUIET = 0.25
+"""Share of the pieces of a toss that have no impact, at least: what parabolas leave of these is noise."""
 MOST_FRAMES = 1e9
 """Of a piece: more than a recording has."""
 ERRORS = 4.6
@@ -113,20 +119,28 @@ def falls(log: Log, acceleration: Array) -> list[Flight]:
 
     Long is more than half as long as the longest one: later parts are between impacts.
     """
-    noise, pieces = noise_of(log), partial(accelerations, offset=log.header.tracked_from_centre)
-    parts = [falling_parts(toss, noise, acceleration, pieces) for toss in log.tosses]
+    noise, offset = noise_of(log), log.header.tracked_from_centre
+    pieces, parts = partial(accelerations, offset=offset), []
+    for toss in log.tosses:
+        left = _left(toss, offset)
+        noisier = math.sqrt(float(np.quantile(left, QUIET))) if len(left) else 0.0
+        parts.append(falling_parts(toss, max(noise, noisier), acceleration, pieces))
     return [next(part for part in of_toss if 2 * len(part) > max(map(len, of_toss))) for of_toss in parts if of_toss]
 
 
 def falling_parts(toss: Toss, noise: float, acceleration: Array, pieces: Callable[[Toss, int], Array]) -> list[Flight]:
-    """The parts of a toss whose pieces all have about an acceleration [m/s²], shape (3,), with a noise of positions [m].
+    """The parts of a toss whose pieces, but for a few in succession, have about an acceleration [m/s²], shape (3,), with a noise of
+    positions [m].
 
     `pieces` gives the accelerations of all pieces of a toss that have some frames, shape (pieces, 3).
     """
     size = window_size(toss, noise, acceleration)
     farthest = max(NEAR * float(length(acceleration)), ERRORS * standard_error(toss, size, noise))
-    near = length(pieces(toss, size) - acceleration) < farthest
-    edges = np.flatnonzero(np.diff(np.pad(near, 1))).reshape(-1, 2)
+    off = length(pieces(toss, size) - acceleration)
+    edges = np.flatnonzero(np.diff(np.pad(off < farthest, 1)))
+    gaps = edges[1:-1].reshape(-1, 2)
+    is_impact = [end - first > JOINED * size or off[first:end].max() > FARTHER * farthest for first, end in gaps]
+    edges = np.concatenate([edges[:1], gaps[np.array(is_impact, dtype=bool)].ravel(), edges[-1:]]).reshape(-1, 2)
     return [Flight(toss, int(first), int(end) + size - 1) for first, end in edges]
 
 
@@ -147,14 +161,17 @@ def window_size(toss: Toss, noise: float = 0.0, acceleration: Array | None = Non
 
 def noise_of(log: Log) -> float:
     """The noise of positions [m]: what parabolas leave of the pieces, in the median."""
-    left = []
-    for toss in log.tosses:
-        t, pieces, curved = _pieces(toss, size := window_size(toss), log.header.tracked_from_centre, size)
-        for column in (np.ones_like(t), t, curved):
-            share = np.einsum("wi,wki->wk", column, pieces) / np.sum(column**2, axis=1)[:, np.newaxis]
-            pieces = pieces - share[..., np.newaxis] * column[:, np.newaxis]
-        left.append(np.sum(pieces**2, axis=(1, 2)) / (3 * (size - 3)))
-    return math.sqrt(float(np.median(np.concatenate(left)))) if any(map(len, left)) else 0.0
+    left = np.concatenate([_left(toss, log.header.tracked_from_centre) for toss in log.tosses])
+    return math.sqrt(float(np.median(left))) if len(left) else 0.0
+
+
+def _left(toss: Toss, offset: Array) -> Array:
+    """The mean square that parabolas leave of each piece of a toss [m²]; `offset` is d [m]."""
+    t, pieces, curved = _pieces(toss, size := window_size(toss), offset, size)
+    for column in (np.ones_like(t), t, curved):
+        share = np.einsum("wi,wki->wk", column, pieces) / np.sum(column**2, axis=1)[:, np.newaxis]
+        pieces = pieces - share[..., np.newaxis] * column[:, np.newaxis]
+    return np.asarray(np.sum(pieces**2, axis=(1, 2)) / (3 * (size - 3)))
 
 
 def accelerations(toss: Toss, size: int, offset: Array) -> Array:

@@ -18,8 +18,8 @@ from dropspin.scenarios.rotations import conjugate, multiply, rotate, turned_sta
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 from dropspin.scenarios.surfaces import Surface, Wall
 
-AWAY = np.array([0.8, 0.0, 0.6])
-"""A horizontal direction that is no axis."""
+AWAY = np.array([math.cos(0.65), 0.0, math.sin(0.65)])
+"""A horizontal direction that is no axis, in which distances are no whole numbers: engines may round positions to a grid."""
 NEXT_AXES = np.array([0.5, 0.5, 0.5, 0.5])
 """The rotation that takes the x axis to the y axis, y to z, and z to x."""
 Tables = Mapping[str, Any] | Sequence[Any] | None

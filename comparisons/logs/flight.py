@@ -129,10 +129,9 @@ def falls(log: Log, acceleration: Array) -> list[Flight]:
 
 
 def falling_parts(toss: Toss, noise: float, acceleration: Array, pieces: Callable[[Toss, int], Array]) -> list[Flight]:
-    """The parts of a toss whose pieces, but for a few in succession, have about an acceleration [m/s²], shape (3,), with a noise of
-    positions [m].
+    """The parts of a toss whose pieces, but for a few in succession, have about an acceleration [m/s²], shape (3,).
 
-    `pieces` gives the accelerations of all pieces of a toss that have some frames, shape (pieces, 3).
+    `noise` is that of positions [m]; `pieces` gives the accelerations of all pieces of a toss that have some frames, shape (pieces, 3).
     """
     size = window_size(toss, noise, acceleration)
     farthest = max(NEAR * float(length(acceleration)), ERRORS * standard_error(toss, size, noise))

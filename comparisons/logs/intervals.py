@@ -37,7 +37,7 @@ def intervals_of_means(values: Array, simultaneous: bool = False) -> tuple[Array
 
     Args:
         values: A row for each toss, shape (n, k).
-        simultaneous: Whether the intervals hold for all columns at once.
+        simultaneous: Whether the intervals hold for all columns at once; each is then symmetric, whatever the sign of its column.
 
     Returns:
         The lower and the upper ends, shape (k,); NaN for a column of fewer than `FEWEST` values.
@@ -55,6 +55,8 @@ def intervals_of_means(values: Array, simultaneous: bool = False) -> tuple[Array
             deviations, errors, out=np.copysign(np.where(deviations == 0.0, 0.0, np.inf), deviations), where=errors > 0.0
         )
         tail = 0.5 * (1.0 - LEVEL)
+        if simultaneous:
+            studentised, tail = np.hstack([studentised, -studentised]), 1.0 - LEVEL
         lower[columns] = mean - np.quantile(studentised.max(axis=1), 1.0 - tail, method="higher") * error
         upper[columns] = mean - np.quantile(studentised.min(axis=1), tail, method="lower") * error
     return lower, upper

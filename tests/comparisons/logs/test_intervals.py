@@ -40,6 +40,14 @@ def test_simultaneous_intervals_are_seldom_wrong_about_any_pair():
     assert 0.005 <= np.mean(wrong) <= 0.09
 
 
+def test_simultaneous_intervals_do_not_depend_on_the_signs_of_differences():
+    """Which engine of a pair is named first decides only the sign, also of skewed differences."""
+    values, signs = lognormal(20, 3, 5), np.array([1.0, -1.0, -1.0])
+    ends = np.array(intervals_of_means(values, simultaneous=True))
+    turned = np.array(intervals_of_means(signs * values, simultaneous=True))
+    assert turned == pytest.approx(np.where(signs > 0.0, ends, -ends[::-1]), rel=1e-12)
+
+
 def test_share_has_the_interval_of_clopper_and_pearson():
     """All of 10: from 0.025^(1/10); 1 of 20: from the table of Clopper and Pearson."""
     assert interval_of_share(np.ones(10)) == pytest.approx((0.025**0.1, 1.0))

@@ -139,8 +139,8 @@ def falling_parts(toss: Toss, noise: float, acceleration: Array, pieces: Callabl
     edges = np.flatnonzero(np.diff(np.pad(off < farthest, 1)))
     gaps = edges[1:-1].reshape(-1, 2)
     is_impact = [end - first > JOINED * size or off[first:end].max() > FARTHER * farthest for first, end in gaps]
-    edges = np.concatenate([edges[:1], gaps[np.array(is_impact, dtype=bool)].ravel(), edges[-1:]]).reshape(-1, 2)
-    return [Flight(toss, int(first), int(end) + size - 1) for first, end in edges]
+    apart = np.concatenate([edges[:1], gaps[np.array(is_impact, dtype=bool)].ravel(), edges[-1:]]).reshape(-1, 2)
+    return [Flight(toss, int(first), int(end) + size - 1) for first, end in apart]
 
 
 def standard_error(toss: Toss, size: int, noise: float) -> float:

@@ -2,18 +2,20 @@
 
 import re
 import sys
+import tomllib
 from collections.abc import Mapping
 from contextlib import redirect_stdout, suppress
 from importlib import import_module
 from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points
 from importlib.util import find_spec
 from operator import attrgetter
+from pathlib import Path
 from shutil import which
 from typing import NamedTuple
 
 from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissing
 from dropspin.comparisons.engines.exceptions import described
-from dropspin.comparisons.engines.packages import CANNON_ES, HAVOK, JOLT, RAPIER_JS, install_extra, is_npm, npm_package
+from dropspin.comparisons.engines.packages import install_extra, is_npm, npm_package
 from dropspin.scenarios.errors import DropspinError, UnknownName
 from dropspin.scenarios.model import EARLIER_NAMES
 from dropspin.scenarios.validation import shown
@@ -34,44 +36,13 @@ class _Home(NamedTuple):
 
 GROUP = "dropspin.engines"
 """The entry-point group in which other packages register engines: name = "module:Class"."""
-FOLDER = "dropspin.comparisons.engines"
-WHEELS = " (it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere it needs a compiler)"
 NO_NODE = "it runs in Node.js, and there is no node on PATH"
-WHERE = ", in the working folder or a folder above it"
-LIBRARY = ", and ODE's library (Debian, Ubuntu: apt-get install libode8)"
-BUILT_IN = {"wang": _Home(f"{FOLDER}.wang", "Wang")} | {
-    name: _Home(f"{FOLDER}.{name.replace('-', '_')}_engine", adapter, package, *command)
-    for name, adapter, package, *command in (
-        ("mujoco", "MuJoCo", "mujoco", "pip install mujoco"),
-        ("pybullet", "PyBullet", "pybullet", "pip install pybullet", WHEELS),
-        ("rapier", "Rapier", "rapier3d"),
-        ("rapier-js", "RapierJS", RAPIER_JS, f"npm install {RAPIER_JS}", WHERE),
-        ("cannon-es", "CannonES", CANNON_ES, f"npm install {CANNON_ES}", WHERE),
-        ("jolt", "Jolt", JOLT, f"npm install {JOLT}", WHERE),
-        ("havok", "Havok", HAVOK, f"npm install {HAVOK}", WHERE),
-        ("dart", "Dart", "dartpy"),
-        ("drake", "Drake", "pydrake"),
-        ("box3d", "Box3D", "robox3d"),
-        ("ode", "ODE", "odepy", "", LIBRARY),
-        ("sapien", "Sapien", "sapien"),
-        ("exudyn", "Exudyn", "exudyn"),
-        ("jsbsim", "JSBSim", "jsbsim"),
-        ("mjx", "MJX", "jax"),
-        ("mujoco-warp", "MuJoCoWarp", "mujoco_warp"),
-        ("newton", "Newton", "newton"),
-        ("genesis", "Genesis", "genesis"),
-        ("brax", "Brax", "brax"),
-    )
-}
-CURES = {
-    r"ODE library not found": "install the library (Debian, Ubuntu: apt-get install libode8)",
-    r"libGL\.so|libEGL\.so|libOSMesa": "install the system's OpenGL libraries (Debian, Ubuntu: apt-get install libgl1 libegl1)",
-    r"libstdc\+\+.*GLIBCXX|GLIBC_\d": "its wheel needs a newer system; install a release that was built for this one",
-    r"compiled using NumPy 1|numpy\.core\.multiarray|numpy\.dtype size changed": "install a release for this NumPy, or an older NumPy",
-    r"wrong ELF class|invalid ELF header|incompatible architecture": "its wheel is for another processor; install it again with pip",
-    r"partially initialized|cannot import name|No module named": "it is incomplete, or a file of the same name hides it; install it again",
-}
+_TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+BUILT_IN = {name: _Home(**home) for name, home in _TABLES["engines"].items()}
+CURES: dict[str, str] = _TABLES["cures"]
 """By what the import of a package says: what to do."""
+DISTRIBUTIONS: list[str] = _TABLES["distributions"]
+"""The distributions of engines, whose versions a run records."""
 MOVED = frozenset({"scenarios", "reference_impl", "comparisons", "reports"})
 """Packages of earlier versions that are parts of `dropspin` now."""
 

@@ -16,29 +16,12 @@ from typing import Any
 import numpy as np
 
 from dropspin.comparisons.engines.packages import version
-from dropspin.comparisons.engines.registry import parsed
+from dropspin.comparisons.engines.registry import DISTRIBUTIONS, parsed
 from dropspin.scenarios import Trajectory
 from dropspin.scenarios.text import printable
 
 MEASURING = ("dropspin", "numpy", "numba", "scipy")
-ENGINES = (
-    *("mujoco", "pybullet", "rapier3d", "@dimforge/rapier3d-compat", "dartpy", "drake"),
-    *(
-        "cannon-es",
-        "jolt-physics",
-        "@babylonjs/havok",
-        "robox3d",
-        "ode-python",
-        "sapien",
-        "exudyn",
-        "jsbsim",
-        "genesis-world",
-        "quadrants",
-        "torch",
-    ),
-    *("brax", "mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang"),
-)
-STAMPED = (*MEASURING, *ENGINES)
+STAMPED = (*MEASURING, *DISTRIBUTIONS)
 PACKAGES = tuple(Path(__file__).parents[2] / package for package in ("scenarios", "reference_impl", "comparisons"))
 """The packages that results depend on; the reports only show them."""
 

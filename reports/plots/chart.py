@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dropspin.reports.plots.colours import Dashes, human_label
+from dropspin.reports.plots.colours import TABLES, Dashes, human_label
 from dropspin.reports.plots.style import LINE, ROUNDING, ink, is_grey, label_powers
 from dropspin.scenarios.state import Array
 
@@ -16,14 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 DASHES: dict[Dashes, Any] = {"": "-", "dashed": (0, (3, 3)), "dotted": ":", "dashdot": "-.", "long": (0, (9, 2))}
-GREYS: tuple[tuple[str, Dashes], ...] = (
-    ("0", ""),
-    ("0.55", ""),
-    ("0.25", "dashdot"),
-    ("0.65", "long"),
-    ("0.4", "dashed"),
-    ("0.7", "dotted"),
-)
+GREYS: list[tuple[str, Dashes]] = TABLES["greys"]
 """Greys and dash patterns of the lines in a grey style, in the order of their labels."""
 MARKER = 5.0  # points
 BETWEEN_MARKERS = 0.18  # of the diagonal of the axes

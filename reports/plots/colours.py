@@ -1,14 +1,17 @@
 """Labels and styles that all plots and tables share: a name to read, a colour, a marker and a dash pattern per engine, by its label."""
 
 import re
+import tomllib
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 from zlib import crc32
 
 from dropspin.comparisons.engines.options import parts_of
 from dropspin.comparisons.engines.registry import BUILT_IN
 
 Dashes = Literal["", "dashed", "dotted", "dashdot", "long"]
+TABLES: dict[str, Any] = tomllib.loads(Path(__file__).with_name("plots.toml").read_text(encoding="utf-8"))
 
 # Okabe & Ito (2008), Color Universal Design: distinguishable with any colour vision, on white and on near black.
 KNOWN = {"wang": ("#0072B2", "o"), "mujoco": ("#D55E00", "s"), "pybullet": ("#009E73", "D")}
@@ -19,10 +22,7 @@ STYLES = [(colour, marker) for marker in MARKERS for colour in COLOURS]
 REPEATED: tuple[Dashes, ...] = ("", "dashdot", "long")
 """The dash patterns of the first, second and third engine of a colour; those of exact solutions, fits and guides are others."""
 
-NAMES = {name: home.adapter for name, home in BUILT_IN.items()} | {
-    **{"wang": "Wang's method", "rapier-js": "Rapier (JavaScript)", "cannon-es": "cannon-es"},
-    **{"dart": "DART", "sapien": "SAPIEN", "mujoco-warp": "MuJoCo Warp"},
-}
+NAMES: dict[str, str] = {name: home.adapter for name, home in BUILT_IN.items()} | TABLES["names"]
 """The names of engines as their authors write them; an engine that is not listed keeps the name by which commands take it."""
 OPTIONS = {"integrator=rk4": "RK4", "rotation=rk4": "RK4", "integrator=euler": "Euler", "profile=default": "default settings"}
 LABEL = re.compile(r"([^\[\]\s,]+(?:\[[^\[\]]*\])?)(, .*)?")

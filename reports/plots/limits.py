@@ -9,24 +9,13 @@ from dropspin.comparisons.limits.axes import Axis
 from dropspin.comparisons.limits.failure_modes import FAILURE_MODES
 from dropspin.comparisons.limits.study import AxisScan, LimitsStudy
 from dropspin.reports.plots.chart import Chart, Line, draw
+from dropspin.reports.plots.colours import TABLES
 from dropspin.reports.plots.style import plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Sound is pale; the others, after Okabe & Ito (2008), are distinguishable with any colour vision.
-COLOURS = {
-    "declined": "none",
-    "sound": "#9DC79D",
-    "inaccurate": "#F0E442",
-    "gains_energy": "#E69F00",
-    "sinks": "#56B4E9",
-    "tunnels": "#0072B2",
-    "clamped": "#CC79A7",
-    "diverged": "#D55E00",
-    "crashed": "#000000",
-    "timed_out": "#8C8C8C",
-}
+COLOURS: dict[str, str] = TABLES["failure_modes"]
 SAME_MOTION = "#D5D5D5"
 """Along an axis that does not change the exact motion: the engine has its failure mode, if any, at every value."""
 BAR = 10.0  # points

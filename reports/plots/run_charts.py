@@ -9,6 +9,7 @@ from dropspin.comparisons.measuring.predictions import spins_steadily
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.plots.bounces import bounce_ladder
 from dropspin.reports.plots.chart import Chart
+from dropspin.reports.plots.colours import TABLES
 from dropspin.reports.plots.convergence import error_over_dt
 from dropspin.reports.plots.ensembles import angular_momentum_of_ensemble, energy_of_ensemble, rest_of_ensemble
 from dropspin.reports.plots.growth import error_growth
@@ -21,15 +22,7 @@ from dropspin.scenarios import reference_for
 if TYPE_CHECKING:
     from dropspin.comparisons.tradeoff.pareto import TradeOff
 
-CONVERGENCE = (
-    "energy_error",
-    "bounce_height_error",
-    "horizontal_momentum_error",
-    "angular_momentum_direction_error",
-    "orientation_error",
-    "restitution_error",
-    "position_error",
-)
+CONVERGENCE: list[str] = TABLES["convergence"]
 GROWTH = ("orientation_error", "position_error", "energy_error")
 WORTH_A_POINT, WORTH_A_LINE = 1e-13, 1e-11
 """Errors that never exceed this value are rounding errors, which accumulate over time."""

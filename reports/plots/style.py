@@ -24,17 +24,7 @@ Kept = TypeVar("Kept")
 ByStep = Mapping[tuple[str, str, float], Kept]
 """Trajectories or ensemble outcomes of a run, by scene, engine and time step."""
 
-COMMON: Any = {
-    "text.parse_math": False,  # dollar signs in names are text
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.alpha": 0.15,
-    "legend.frameon": False,
-    "figure.constrained_layout.use": True,
-    "pdf.fonttype": 42,  # TrueType; by default Type 3, which publishers refuse
-    "ps.fonttype": 42,
-}
+COMMON = Path(__file__).with_name("common.mplstyle")
 
 
 SIZES = {"column": (3.4, 2.3, 1, 8.0), "page": (3.5, 2.4, 2, 9.0), "report": (3.7, 2.9, 3, 9.0)}

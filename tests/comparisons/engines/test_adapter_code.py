@@ -32,7 +32,7 @@ def _copied(folder):
         ("rapier_js_engine.py", "rapier_scenes.py"),
         ("mujoco_engine.py", "mujoco_engine.py"),
         ("mjx_engine.py", "mujoco_model.py"),
-        *((f"{file.stem.rpartition('_')[0]}_engine.py", file.name) for file in sorted(HERE.glob("*.toml"))),
+        *((f"{file.stem.rpartition('_')[0]}_engine.py", file.name) for file in sorted(HERE.glob("*_*.toml"))),
     ],
 )
 def test_a_changed_file_of_an_adapter_is_another_engine(tmp_path, adapter, changed):

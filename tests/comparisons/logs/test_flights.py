@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -175,6 +176,28 @@ def test_falls_of_a_point_that_turns_or_of_noisy_positions_begin_at_the_first_fr
         assert flight is not None
         assert flight.first <= 2
         assert -0.03 < flight.toss.t[flight.end - 1] - impact < 0.03
+
+
+def _bounced(noise: Array) -> Toss:
+    """Falls of 0.3 s and of 0.35 s with an impact between them, and noise of shape (frames, 3)."""
+    t = np.arange(len(noise)) / 240.0
+    since = np.maximum(t - 0.3, 0.0)
+    position = np.outer(t**2 / 2.0, DOWN) + np.outer(since, [0.0, 4.6, 0.0]) + noise
+    return Toss("bounced", t, position, np.tile([0.0, 0.0, 0.0, 1.0], (len(t), 1)))
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("kept", [0.0, 0.9])
+def test_the_first_fall_counts_in_a_toss_that_is_noisier_than_others_or_whose_noise_wanders(seed: int, kept: float) -> None:
+    """White noise of 3 mm beside tosses of 0.2 mm; or of 1 mm, of which a frame keeps nine tenths, as trackers do."""
+    random, quiet = np.random.default_rng(seed), made(4, 12, (2e-4, 0.0), rate=240.0).log
+    noise = random.normal(size=(156, 3)) * (1e-3 if kept else 3e-3)
+    for before, frame in pairwise(noise):
+        frame *= np.sqrt(1.0 - kept**2)
+        frame += kept * before
+    [*_, fall] = falls(replace(quiet, tosses=(*quiet.tosses, _bounced(noise))), DOWN)
+    assert fall.toss.name == "bounced"
+    assert fall.end <= 75
 
 
 def test_noise_of_positions_is_that_of_the_frames() -> None:

@@ -1,12 +1,13 @@
 """Flights in recordings that are made by formula, whose parameters, starts and noise are known."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from support import log_fits
 from support.tosses import BRICK, CUBE, made
 
@@ -191,10 +192,7 @@ def _bounced(noise: Array) -> Toss:
 def test_the_first_fall_counts_in_a_toss_that_is_noisier_than_others_or_whose_noise_wanders(seed: int, kept: float) -> None:
     """White noise of 3 mm beside tosses of 0.2 mm; or of 1 mm, of which a frame keeps nine tenths, as trackers do."""
     random, quiet = np.random.default_rng(seed), made(4, 12, (2e-4, 0.0), rate=240.0).log
-    noise = random.normal(size=(156, 3)) * (1e-3 if kept else 3e-3)
-    for before, frame in pairwise(noise):
-        frame *= np.sqrt(1.0 - kept**2)
-        frame += kept * before
+    noise = lfilter([math.sqrt(1.0 - kept**2)], [1.0, -kept], random.normal(size=(156, 3)) * (1e-3 if kept else 3e-3), axis=0)
     [*_, fall] = falls(replace(quiet, tosses=(*quiet.tosses, _bounced(noise))), DOWN)
     assert fall.toss.name == "bounced"
     assert fall.end <= 75
